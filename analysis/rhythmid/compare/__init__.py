@@ -1,4 +1,4 @@
-"""A simulation's record beside a real one; `rhythmid.compare(...)` calls `compare.compare.compare`."""
+"""Comparison of a simulation's record with a real one; `rhythmid.compare(...)` calls `compare.compare.compare`."""
 
 from rhythmid.callable_package import make_callable
 

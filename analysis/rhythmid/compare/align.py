@@ -1,8 +1,8 @@
-"""Alignment: how the clock of one record maps on another's, when both ran the same excitation.
+"""Alignment: the offset between the clocks of two records of the same excitation.
 
-Two recordings rarely start together or share a rate. What was commanded is the same in both, so the cross-correlation of
-the commands finds the offset, refined below a sample by least squares; without a command the forcing's phase does, and
-without either the motion itself, which then hides any constant delay.
+Two recordings rarely start together or share a sample rate. The commands are the same in both. The maximum of their
+cross-correlation gives the offset, which least squares refines below a sample. Without a command the phase of the forcing gives
+it; without either, the motion itself, which then hides any constant delay.
 """
 
 import math
@@ -21,23 +21,23 @@ from rhythmid.simulation.signal import fast_length
 
 Array = NDArray[np.float64]
 Clock = Literal["command", "forcing", "output"]
-MOST_SAMPLES = 200_000  # samples of a common grid
-OVERLAP = 0.3  # share of the shorter record that has to be common to both
+MOST_SAMPLES = 200_000  # largest number of samples of a common grid
+OVERLAP = 0.3  # share of the shorter record that must be common to both
 CLOSE_CORRELATION = (
-    0.03  # of the correlation, within which other offsets of a periodic command are tried as well
+    0.03  # difference of the correlation within which other offsets of a periodic command are tried as well
 )
-TRIED = 12  # offsets of a periodic command
-SAME = 0.05  # relative rms difference up to which two commands are one
-TURN = 0.01  # of a cycle, up to which the forcings stand at the same phase
+TRIED = 12  # offsets of a periodic command that are tried
+SAME = 0.05  # relative rms difference up to which two commands count as equal
+TURN = 0.01  # phase difference [cycles] up to which the forcings count as in phase
 
 
 @dataclass(frozen=True)
 class Alignment:
     """Recording's time = simulation's time + `offset` ± `std` [s].
 
-    `by` is what was compared. `turn` [s] is by how much the simulation's forcing then still precedes the recording's (0 where
-    they agree, or where only one is known); `difference` the relative rms difference of the commands, None where there is none
-    to compare; `mismatch` why the excitations are not the same, empty where they are.
+    `by` names the compared channel. `turn` [s] is the remaining time by which the simulation's forcing precedes the recording's
+    (0 where they agree, or where only one is known). `difference` is the relative rms difference of the commands, None where
+    there is none to compare. `mismatch` says why the excitations differ; empty where they do not.
     """
 
     by: Clock
@@ -49,17 +49,17 @@ class Alignment:
 
 
 def smooth(channel: Channel) -> CubicSpline:
-    """Cubic spline through the samples of a channel (at least two of them apart)."""
+    """Cubic spline through the samples of a channel (at least two distinct ones)."""
     return CubicSpline(channel.time, channel.value)
 
 
 def active(channel: Channel | None) -> bool:
-    """Whether a channel does anything."""
+    """Whether a channel varies."""
     return channel is not None and len(channel) > 8 and float(np.ptp(channel.value)) > 0.0
 
 
 def white_level(value: Array) -> float:
-    """Standard deviation of the white part of a smooth signal's samples, by their third differences."""
+    """Standard deviation of the white noise in samples (n,) of a smooth signal, in their unit, from third differences."""
     if len(value) < 16:
         return 0.0
     return float(USUAL * np.median(np.abs(np.diff(value, 3))) / math.sqrt(20.0))
@@ -88,7 +88,7 @@ def align(simulation: Record, recording: Record) -> Alignment:
 
 
 def _correlation(recording: Array, simulation: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Normalised correlation of two signals on one grid and its lags; what hardly overlaps counts for little."""
+    """Normalised correlation of two signals on one grid, and its lags; lags with little overlap are weighted down."""
     n, m = len(recording), len(simulation)
     size = fast_length(n + m - 1)
 
@@ -158,7 +158,7 @@ def _refined(
 
 
 def _forcings(simulation: Record, recording: Record, offset: float) -> tuple[float, str]:
-    """By how much the simulation's forcing precedes the recording's at this offset [s], and how else they differ."""
+    """Time [s] by which the simulation's forcing precedes the recording's at this offset, and other differences in words."""
     a, b = active_pumping(simulation), active_pumping(recording)
     if a is None or b is None:
         return 0.0, ""
@@ -199,7 +199,7 @@ def _by_command(simulation: Record, recording: Record, sent: Channel, seen: Chan
 
 
 def _agreement(simulation: Record, recording: Record, offset: float) -> tuple[float, float]:
-    """Correlation of the motions at an offset, and the share of the shorter record that is common to both."""
+    """Correlation of the motions at an offset, and the common share of the shorter record."""
     a, b = simulation.output, recording.output
     inside = (b.time >= a.time[0] + offset) & (b.time <= a.time[-1] + offset)
     common = float(inside.sum() * b.period / min(simulation.duration, recording.duration))
@@ -212,7 +212,7 @@ def _agreement(simulation: Record, recording: Record, offset: float) -> tuple[fl
 
 
 def _by_forcing(simulation: Record, recording: Record) -> Alignment | None:
-    """Offset that lines up the forcings; of those a period apart, the one at which the motions agree best."""
+    """The offset that aligns the forcings; among those a period apart, the one with the best agreement of the motions."""
     a, b = active_pumping(simulation), active_pumping(recording)
     if a is None or b is None:
         return None

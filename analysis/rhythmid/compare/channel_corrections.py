@@ -1,4 +1,4 @@
-"""Channel corrections: delays, lags, gains, offsets and drifts applied to a simulated motion itself, whatever their size."""
+"""Channel corrections: delays, lags, gains, offsets and drifts of any size, applied to a simulated motion."""
 
 import math
 from collections.abc import Mapping
@@ -16,13 +16,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Correction:
-    """An effect on the way in or out, with its one number."""
+    """An effect on a channel, input or output, with its one parameter."""
 
     name: str
     slot: str
     parameter: str
     neutral: float
-    kind: str  # time, lag, gain, length, rate or skew: how it is searched and which unit it has
+    kind: str  # time, lag, gain, length, rate or skew: determines the unit and the search
 
 
 CORRECTIONS = (
@@ -37,7 +37,7 @@ CORRECTIONS = (
     Correction("sensor_lag", "sensor", "time_constant", 0.0, "lag"),
     Correction("command_lag", "command", "time_constant", 0.0, "lag"),
 )
-ALIKE = {  # what looks the same from outside
+ALIKE = {  # corrections that are observationally equivalent
     "sensor_drift": ("a slow force",),
     "measurement_delay": ("a delay of forcing and command together",),
     "sensor_lag": ("actuator_lag",),
@@ -47,11 +47,11 @@ ALIKE = {  # what looks the same from outside
 
 
 def predicted(pair: Pair, values: Mapping[str, float]) -> Array:
-    """The simulated motion (n,) after effects on the way in and out, by the names of `CORRECTIONS`."""
+    """The simulated motion (n,) after corrections of the channels, given by the names of `CORRECTIONS`."""
     n = len(pair.time)
     mean = float(np.mean(pair.simulation))
     base = pair.cycle if pair.cycle is not None else np.full(n, mean)
-    answer = pair.simulation - base  # to the command
+    answer = pair.simulation - base  # response to the command
     answer = late_by(
         _lagged(answer, values.get("command_lag", 0.0), pair.step), values.get("input_delay", 0.0), pair
     )
@@ -65,7 +65,7 @@ def predicted(pair: Pair, values: Mapping[str, float]) -> Array:
 
 
 def late_by(signal: Array, delay: Array | float, pair: Pair) -> Array:
-    """The signal (n,) as it was `delay` [s] before."""
+    """The signal (n,) delayed by `delay` [s]."""
     if not np.any(delay):
         return signal
     asked = np.clip(pair.time - delay, pair.time[0], pair.time[-1])
@@ -73,7 +73,7 @@ def late_by(signal: Array, delay: Array | float, pair: Pair) -> Array:
 
 
 def _lagged(signal: Array, constant: float, step: float) -> Array:
-    """First-order lag of a signal that runs straight between its samples, at rest before the first."""
+    """First-order lag of a signal that is linear between its samples, at rest before the first."""
     if constant < 1e-3 * step:
         return signal
     keep = math.exp(-step / constant)

@@ -1,9 +1,8 @@
-"""Compare a simulation's record with a real one directly: where do they part?
+"""Compare a simulation's record directly with a real one: where do they differ?
 
-The two are aligned by what was commanded, brought to common times and subtracted. Where the difference sits (in time, in the cycle,
-in the states, at which frequency and harmonic) is read off it; in which slot of the signal path it arises is found by `explain`.
-Nothing is refitted. Where the excitations differ, a given model takes the simulation's place: it is fitted to the simulation and run
-with the recording's inputs.
+The two are aligned by the command, interpolated at common times and subtracted. The difference is then located in time, in the cycle, in
+the states, in frequency and among harmonics; `explain` finds the slot of the signal path where it arises. Nothing is refitted. If
+the excitations differ, a given model replaces the simulation: it is fitted to the simulation and run with the recording's inputs.
 """
 
 import math
@@ -40,7 +39,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class HarmonicRatio:
-    """The recording's harmonic of the forcing over the simulation's: `gain`, and `late` [s] by its phase."""
+    """Ratio of the recording's harmonic of the forcing to the simulation's: `gain`, and the delay `late` [s] from the phase."""
 
     number: int
     gain: float
@@ -56,27 +55,27 @@ class Comparison(Result):
     simulation, recording
         Names of the two records.
     alignment
-        Offset between their clocks, and what it was found from.
+        Offset between their clocks, and the channel that it was found from.
     through_model
         Whether a model ran in the simulation's place.
     rates
-        Of simulation and recording [Hz].
+        Sample rates of simulation and recording [Hz].
     pair
-        Both on common times.
+        Both motions at common times.
     nrmse
         Root mean square of the difference over the standard deviation of the recording.
     explanations
         Changes that reduce the difference, the largest share first.
     left
-        What the explanations leave of the difference; float64[n], in `unit`.
+        Remainder of the difference after the explanations; float64[n], in `unit`.
     place
         Where in time, frequency, cycle and state the difference lies.
     harmonics
-        Of the forcing, recording over simulation.
+        Ratios of the forcing's harmonics, recording over simulation.
     unit
-        Of the measured motion.
+        Unit of the measured motion.
     notes
-        What the user should know, one line each.
+        Notes for the user, one line each.
     """
 
     simulation: str
@@ -105,7 +104,7 @@ class Comparison(Result):
 
     @property
     def comparable(self) -> bool:
-        """Whether both ran the same excitation, or a model has made up for it."""
+        """Whether both had the same excitation, or a model has compensated for the difference."""
         return self.through_model or not self.alignment.mismatch
 
     def to_dict(self) -> dict[str, Any]:
@@ -176,7 +175,7 @@ class Comparison(Result):
         }
 
     def show(self, console: "Console") -> None:
-        """Print how the two were aligned, the answer and its notes."""
+        """Print the alignment, the answer and its notes."""
         from rhythmid.compare.printed import show
 
         show(self.to_dict(), console)
@@ -237,7 +236,7 @@ def _size(value: float, unit: str) -> str:
 
 
 def run_of(found: Comparison) -> Run:
-    """Recording and simulation as figures show them."""
+    """Recording and simulation in the form that figures need."""
     pair = found.pair
     return Run(
         name=found.recording,
@@ -339,7 +338,7 @@ def _unit_notes(simulation: Record, recording: Record) -> list[str]:
 
 
 def in_its_place(simulation: Record, recording: Record, model: Model) -> Record:
-    """What the simulation would have done with the recording's inputs: the model, fitted to it, run with those."""
+    """Response of the simulated machine to the recording's inputs: the model is fitted to the simulation and run with them."""
     fit = estimate(model, prepare([simulation]))
     series = prepare([recording])
     run = start_only(fit.model, series, fit.noise, fit.run.max_step)

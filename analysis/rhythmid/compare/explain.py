@@ -1,9 +1,9 @@
-"""Explain the difference of two aligned motions without a model: what has to be done to one to become the other?
+"""Explain the difference of two aligned motions without a model: which change of one makes it equal to the other?
 
-Effects on the way in and out are applied to the simulated motion itself, whatever their size (`corrections`). Forces are unknown smooth
-functions of position, velocity, phase or time, whose effect on the motion is found by an oscillator fitted to the simulation (`forces`);
-they are judged by stretches that were left out of their fit. Of explanations that do almost equally well the simplest is taken,
-and the search goes on with what it leaves.
+Effects on the input and output channels are applied to the simulated motion, whatever their size (`corrections`). Forces are unknown
+smooth functions of position, velocity, phase or time. Their effect on the motion is computed by an oscillator fitted to the
+simulation (`forces`), and judged on stretches left out of their fit. Of explanations that are almost equally good the simplest is
+taken. The search then continues with the remainder.
 """
 
 from collections.abc import Mapping
@@ -19,12 +19,14 @@ from rhythmid.compare.pair import Pair
 
 Array = NDArray[np.float64]
 FOLDS, DEALT = 5, 20  # folds of a cross-validation, stretches in each
-LEAST_SHARE = 0.02  # share of what is left that an explanation has to take away to be one
-LEAST_OF_WHOLE = 0.004  # share of the whole difference that it has to take away where the oscillator limits what can be explained
+LEAST_SHARE = 0.02  # share of the remainder that an explanation must remove
+LEAST_OF_WHOLE = (
+    0.004  # share of the whole difference that it must remove where the oscillator limits the accuracy
+)
 LEAST_OF_WHOLE_CHANNEL = 0.001  # the same among channel corrections, which are applied exactly
-LEAST_OF_WHOLE_ROUGH = 0.05  # the same where limit cycle and response had to be shifted each for itself
-SIMPLER = 0.03  # share by which a simpler explanation may fall behind
-MOST_EXPLANATIONS = 4  # explanations
+LEAST_OF_WHOLE_ROUGH = 0.05  # the same where limit cycle and response had to be shifted separately
+SIMPLER = 0.03  # share by which a simpler explanation may be worse
+MOST_EXPLANATIONS = 4
 EQUIVALENT = {
     "command_lag": "input_delay", "input_delay": "command_lag", "sensor_lag": "measurement_delay", "measurement_delay": "sensor_lag",
 }  # fmt: skip
@@ -33,10 +35,10 @@ UNITS = {"time": "s", "lag": "s", "gain": "", "skew": ""}
 
 @dataclass(frozen=True)
 class Explanation:
-    """What takes away the share `explained` of the difference that was left before it.
+    """An explanation that removes the share `explained` of the difference left before it.
 
-    `name` is an element of the catalogue, or what a free function goes with; `slot` where it sits; `also` what looks the same
-    from outside; `values` name -> (value, unit).
+    `name` is an element of the catalogue, or the quantity that a free function depends on. `slot` is its place in the signal path.
+    `also` lists observationally equivalent changes. `values` maps names to (value, unit).
     """
 
     name: str
@@ -48,8 +50,11 @@ class Explanation:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """An explanation tried: sum of squares it leaves, how simple it is (0 the simplest), and the values of all channel corrections or the columns
-    of the function that it needs."""
+    """A tried explanation.
+
+    `square` is the sum of squares that it leaves, `rank` its complexity (0 is the simplest). It needs either the values of all
+    channel corrections or the columns of a function.
+    """
 
     square: float
     rank: int
@@ -59,7 +64,7 @@ class Trial:
 
 
 class Difference:
-    """What is left of the difference of a pair, with a free start and forces already named projected out."""
+    """The remaining difference of a pair, with a free initial state and the forces found so far projected out."""
 
     def __init__(self, pair: Pair) -> None:
         self.pair = pair
@@ -76,7 +81,7 @@ class Difference:
         self._settle()
 
     def without_force(self) -> None:
-        """Forget the force, so that it can be found anew beside the channel corrections."""
+        """Remove the force, so that it can be sought again beside the channel corrections."""
         self.force = None
         self._settle()
 
@@ -95,7 +100,7 @@ class Difference:
         return raw - self.basis @ (self.basis.T @ raw)
 
     def whole(self) -> Array:
-        """What is left at all times (n,)."""
+        """The remainder (n,) at all times."""
         raw = self.pair.recording - predicted(self.pair, self.values)
         return (
             raw
@@ -104,7 +109,7 @@ class Difference:
         )
 
     def share(self, square: float) -> float:
-        """Share of what is left beyond noise that a remaining sum of squares takes away."""
+        """Share of the remainder beyond noise that is removed if the sum of squares `square` is left."""
         floor = len(self.residual) * self.pair.noise**2
         beyond = self.square - floor if self.square > 1.5 * floor else self.square
         return (self.square - square) / max(beyond, 1e-300)
@@ -112,7 +117,7 @@ class Difference:
     def fitted(
         self, names: list[str], correction: Correction | None = None
     ) -> tuple[float, dict[str, float]]:
-        """Sum of squares and values of these corrections fitted together; of the last one, `correction`, several starts are tried."""
+        """Fit these corrections together; of the last one, `correction`, several starts are tried. Sum of squares and values."""
         pair = self.pair
         span, size, length = (
             1.0 / pair.frequency,
@@ -146,7 +151,7 @@ class Difference:
         return 2.0 * float(found.cost), {name: float(v) for name, v in zip(names, found.x * sizes)}
 
     def left_out(self, columns: Array) -> float:
-        """Sum of squares of stretches that were left out of the fit of these columns."""
+        """Sum of squares on stretches left out of the fit of these columns."""
         part = columns[self.pair.used]
         part = part - self.basis @ (self.basis.T @ part)
         norms = np.linalg.norm(part, axis=0)
@@ -165,7 +170,7 @@ class Difference:
         return total
 
     def corrections(self, blind: bool) -> list[Trial]:
-        """Every channel correction, joined to those already found; `blind` where the motions themselves were aligned."""
+        """Every channel correction, fitted with those already found; `blind` where the motions themselves were aligned."""
         found = []
         for correction in CORRECTIONS:
             if correction.name in self.values or (blind and correction.name == "measurement_delay"):
@@ -185,7 +190,7 @@ class Difference:
         return found
 
     def forces(self) -> list[Trial]:
-        """Every force that might be missing: a foreign line, and free functions."""
+        """Every possible missing force: a spectral line that is no harmonic of the forcing, and free functions."""
         found = []
         line = foreign_line(self.pair, self.whole())
         if line is not None:
@@ -198,22 +203,22 @@ class Difference:
         return found
 
     def simplest(self, trials: list[Trial]) -> Trial:
-        """The best of the simplest trials that hardly fall behind the best of all."""
+        """The best of the simplest trials among those almost as good as the best of all."""
         top = self.share(min(trial.square for trial in trials))
         near = [trial for trial in trials if self.share(trial.square) >= (1.0 - SIMPLER) * top]
         return min(near, key=lambda trial: (trial.rank, trial.square))
 
     def told(self, trial: Trial) -> Explanation:
-        """The trial's explanation with its share of what is left."""
+        """The trial's explanation with the share of the remainder that it removes."""
         return replace(trial.what, explained=float(np.clip(self.share(trial.square), 0.0, 1.0)))
 
 
 def explain(
     pair: Pair, unit: str, blind: bool = False, rough: bool = False
 ) -> tuple[list[Explanation], Array]:
-    """What explains the difference of a pair whose motions are in `unit`, step by step, and what is left of it (n,).
+    """Explain the difference of a pair whose motions are in `unit`, step by step; also returns the remainder (n,).
 
-    `blind` says that the motions themselves were aligned, which hides a constant delay; `rough` that the pair is not exact.
+    `blind`: the motions themselves were aligned, which hides a constant delay. `rough`: the pair is not exact.
     """
     known = Difference(pair)
     raw = (pair.recording - pair.simulation)[pair.used]
@@ -250,7 +255,7 @@ def explain(
 
 
 def _pruned(known: Difference, found: list[Explanation], whole: float) -> list[Explanation]:
-    """The explanations without those that later ones have made needless."""
+    """The explanations without those that later ones have made unnecessary."""
     for one in found[:-1]:
         rest = [name for name in known.values if name != one.name]
         if one.name not in known.values or not rest:
@@ -266,7 +271,7 @@ def _pruned(known: Difference, found: list[Explanation], whole: float) -> list[E
 
 
 def _force_anew(known: Difference, found: list[Explanation]) -> list[Explanation]:
-    """The force found again now that the channel corrections are known: it may be simpler than it looked through them."""
+    """Seek the force again with the channel corrections known: it may be simpler than it appeared without them."""
     before = next(one for one in found if one.slot is not None and one.name not in known.values)
     known.without_force()
     chosen = known.simplest(known.forces())
@@ -279,7 +284,7 @@ def _force_anew(known: Difference, found: list[Explanation]) -> list[Explanation
 
 
 def _swapped(known: Difference, found: list[Explanation]) -> list[Explanation]:
-    """The explanations with a lag in the place of a delay, or the reverse, where that does better beside all the others."""
+    """The explanations with a lag instead of a delay, or the reverse, where that fits better beside all the others."""
     for one in list(found):
         other = EQUIVALENT.get(one.name)
         if other is None or one.name not in known.values or other in known.values:
@@ -296,7 +301,7 @@ def _swapped(known: Difference, found: list[Explanation]) -> list[Explanation]:
 
 
 def _valued(one: Explanation, values: Mapping[str, float], unit: str) -> Explanation:
-    """The explanation with the number that all of them together settled on."""
+    """The explanation with the value from the fit of all of them together."""
     correction = next((w for w in CORRECTIONS if w.name == one.name), None)
     if correction is None or one.name not in values:
         return one

@@ -1,4 +1,4 @@
-"""Forces that might be missing, as free functions of what the recording shows: columns whose combination a fit chooses."""
+"""Possible missing forces as free functions of the recorded signals: columns that a fit combines."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +9,12 @@ from rhythmid.compare.channel_corrections import late_by
 from rhythmid.compare.pair import Pair
 
 Array = NDArray[np.float64]
-SPLINES = 8  # of a function of one quantity
-HARMONICS = 6  # of a function of the forcing's phase
+SPLINES = 8  # basis functions of one quantity
+HARMONICS = 6  # harmonics of a function of the forcing's phase
 
 
 def _splines(values: Array, count: int) -> Array | None:
-    """Cubic B-splines over all but the outermost thousandths of the values, (n, count)."""
+    """Cubic B-splines over the values without the outermost thousandths, (n, count)."""
     low, high = np.quantile(values, [0.001, 0.999])
     if not high > low:
         return None
@@ -25,9 +25,9 @@ def _splines(values: Array, count: int) -> Array | None:
 
 
 def force_functions(pair: Pair, late: float) -> list[tuple[str, str, int, Array]]:
-    """What a missing force may go with: (name, slot, rank of simplicity, columns (n, q)).
+    """Functions that a missing force may depend on: (name, slot, rank of complexity, columns (n, q)).
 
-    `late` [s] is how late the measured motion is behind the forces.
+    `late` [s] is the delay of the measured motion relative to the forces.
     """
     x, v = pair.recording, pair.velocity
     acting = None if pair.effort is None else _splines(late_by(pair.effort, late, pair), SPLINES)
@@ -51,7 +51,7 @@ def force_functions(pair: Pair, late: float) -> list[tuple[str, str, int, Array]
 
 
 def foreign_line(pair: Pair, residual: Array) -> tuple[float, Array] | None:
-    """Frequency [Hz] of the strongest line in a residual (n,) that no harmonic of the forcing is, and its two waves (n, 2)."""
+    """Frequency [Hz] of the strongest line in a residual (n,) that is no harmonic of the forcing, and its sine and cosine (n, 2)."""
     n = len(residual)
     resolution = 1.0 / (n * pair.step)
     power = np.abs(np.fft.rfft((residual - residual.mean()) * np.hanning(n), 4 * n)) ** 2

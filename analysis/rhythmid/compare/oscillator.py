@@ -1,4 +1,4 @@
-"""The oscillator that a simulated motion shows: what small forces do to a machine, without a model of it."""
+"""A linear oscillator fitted to a simulated motion: the response of a machine to small forces, without a model of it."""
 
 import math
 from dataclasses import dataclass
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from rhythmid.simulation.signal import fast_length
 
 Array = NDArray[np.float64]
-FEWEST_FREQUENCIES = 8  # frequencies that a force has to hold; a single line takes three
+FEWEST_FREQUENCIES = 8  # minimum number of frequencies in a force; a single line takes three
 
 
 @dataclass(frozen=True)
 class Oscillator:
-    """x'' + damping x' + omega² x = gain · force, with omega [rad/s] and damping [1/s]: what small forces do."""
+    """x'' + damping x' + omega² x = gain · force, with omega [rad/s] and damping [1/s]: the response to small forces."""
 
     omega: float
     damping: float
@@ -32,7 +32,7 @@ class Oscillator:
         )[:n]
 
     def free(self, time: Array) -> Array:
-        """What two unknown initial conditions do, (n, 2)."""
+        """Responses to two unknown initial conditions, (n, 2)."""
         t = time - time[0]
         turned = 1j * math.sqrt(max(self.omega**2 - 0.25 * self.damping**2, 0.01 * self.omega**2))
         wave = np.exp((turned - 0.5 * self.damping) * t)
@@ -42,10 +42,10 @@ class Oscillator:
 def oscillator_of(
     effort: Array, motion: Array, step: float, dominant: float, bandwidth: float
 ) -> Oscillator | None:
-    """Oscillator that turns a force (n,) into a motion (n,), both at steps [s], by what moves below `bandwidth` [Hz].
+    """Oscillator that maps a force (n,) to a motion (n,), both with step `step` [s], fitted below `bandwidth` [Hz].
 
-    Iterated weighted least squares over frequency (C. K. Sanathanan, J. Koerner, IEEE Trans. Autom. Control 8 (1963) 56) with a
-    delay that is tried out, up to half a period of the `dominant` motion [Hz]. None where the force holds too few frequencies.
+    Iterated weighted least squares over frequency (C. K. Sanathanan, J. Koerner, IEEE Trans. Autom. Control 8 (1963) 56). A delay
+    of up to half a period of the `dominant` motion [Hz] is found by trial. None where the force contains too few frequencies.
     """
     n = len(motion)
     window = np.hanning(n)
@@ -80,8 +80,10 @@ def oscillator_of(
 
 
 def ringing(motion: Array, step: float, dominant: float) -> Oscillator | None:
-    """Oscillator that a free motion (n,) shows around its `dominant` frequency [Hz], by regression on itself a quarter and half a
-    period earlier; None where it does not ring down."""
+    """Oscillator of a free motion (n,) around its `dominant` frequency [Hz]; None where the motion does not ring down.
+
+    The motion is regressed on its values a quarter and half a period earlier.
+    """
     lag = max(1, round(0.25 / (dominant * step)))
     if len(motion) < 4 * lag:
         return None

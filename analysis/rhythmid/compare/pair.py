@@ -1,4 +1,4 @@
-"""A simulated and a recorded motion at common times, and what is known of their inputs."""
+"""A simulated and a recorded motion at common times, with their known inputs."""
 
 import math
 from dataclasses import dataclass, replace
@@ -14,19 +14,20 @@ from rhythmid.ltp.pumping import active_pumping
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-FEWEST_SAMPLES = 64  # common samples below which nothing can be said
-COMMON_PERIODS = 2.0  # of the motion that have to be common
-HARMONICS = 12  # of the forcing that a limit cycle is made of
+FEWEST_SAMPLES = 64  # minimum number of common samples
+COMMON_PERIODS = 2.0  # minimum number of common periods of the motion
+HARMONICS = 12  # harmonics of the forcing in a limit cycle
 
 
 @dataclass(frozen=True, eq=False)
 class Pair:
     """Two motions (n,) on one even grid with step `step` [s], in the recording's time.
 
-    `cycle` is the part of the simulated motion that repeats with the forcing, its mean included; None without forcing or
-    command, when channel corrections cannot be told apart. `command`, `effort` (forcing plus command), `phase` in [0, 1) where known;
-    `used` marks what counts; `noise` is the standard deviation of white noise in the difference; `frequency` [Hz] of the dominant
-    motion; `bandwidth` [Hz] beyond which nothing moves; `pumping` [Hz] of the forcing; `oscillator` turns small forces into motion.
+    `cycle` is the part of the simulated motion that repeats with the forcing, its mean included. It is None without forcing or
+    command; channel corrections then cannot be told apart. `command`, `effort` (forcing plus command) and `phase` in [0, 1) are
+    given where known. `used` marks the samples that are compared. `noise` is the standard deviation of white noise in the
+    difference. `frequency` [Hz] is that of the dominant motion, `pumping` [Hz] that of the forcing. Beyond `bandwidth` [Hz] there is
+    no motion. `oscillator` gives the response to small forces.
     """
 
     time: Array
@@ -46,7 +47,7 @@ class Pair:
 
     @property
     def velocity(self) -> Array:
-        """Velocity of the recorded motion; what is faster than twice its bandwidth is left out."""
+        """Velocity of the recorded motion, low-pass filtered at twice its bandwidth."""
         n = len(self.recording)
         line = np.linspace(self.recording[0], self.recording[-1], n)
         mirrored = np.concatenate([self.recording - line, -(self.recording - line)[-2:0:-1]])
@@ -58,13 +59,13 @@ class Pair:
 
 
 def harmonic_columns(time: Array, frequency: float, count: int) -> Array:
-    """1, cosines and sines of so many harmonics at times [s], (n, 2 count + 1)."""
+    """A constant, and cosines and sines of `count` harmonics at times [s], (n, 2 count + 1)."""
     angle = 2.0 * np.pi * frequency * np.multiply.outer(time, np.arange(1, count + 1))
     return np.hstack([np.ones((len(time), 1)), np.cos(angle), np.sin(angle)])
 
 
 def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tuple[Pair, list[str]]:
-    """Both motions at common times, and remarks. Raises InputError when they have too little in common."""
+    """Both motions at common times, and notes. Raises InputError when they have too little in common."""
     offset = alignment.offset
     for one in (simulation, recording):
         if len(one.output) < FEWEST_SAMPLES:
@@ -132,8 +133,10 @@ def _dominant(motion: Array, step: float) -> float:
 def _free(
     real: Array, simulated: Array, time: Array, step: float, noise: float, free: bool, pumping: float | None
 ) -> Oscillator | None:
-    """The oscillator that shows where no rich force does: in the simulated motion if that is `free`, else in the difference
-    between the harmonics of the forcing; None if neither rings."""
+    """The oscillator where no force with enough frequencies is known; None if the motion does not ring.
+
+    Fitted to the simulated motion if that is `free`, else to the difference without the harmonics of the forcing.
+    """
     if free and pumping is None:
         return ringing(simulated, step, _dominant(simulated, step))
     rest = real - simulated
@@ -146,9 +149,9 @@ def _free(
 
 
 def _with_cycle(pair: Pair, frequency: float, turn: float) -> tuple[Pair, list[str]]:
-    """The pair with the simulation's limit cycle told from its response to the command.
+    """The pair with the simulation's limit cycle separated from its response to the command.
 
-    Where the command began `turn` [s] elsewhere in the forcing's cycle, both are shifted each for itself.
+    If the command began `turn` [s] elsewhere in the forcing's cycle, both are shifted separately.
     """
     assert pair.command is not None
     count = int(np.clip(0.25 / (pair.step * frequency), 1, HARMONICS))
@@ -168,7 +171,7 @@ def _with_cycle(pair: Pair, frequency: float, turn: float) -> tuple[Pair, list[s
 
 
 def _late_start(pair: Pair) -> Array:
-    """The command as the oscillator takes it and a sample later, (n, 2), so that a fit finds a delay of its own."""
+    """The command, and the command delayed by at least a sample, (n, 2): their combination lets a fit adjust the delay."""
     assert pair.command is not None
     shift = max(1, round(0.02 / (pair.frequency * pair.step)))
     late = np.concatenate([np.full(shift, pair.command[0]), pair.command[:-shift]])

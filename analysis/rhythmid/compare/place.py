@@ -1,4 +1,4 @@
-"""Where a difference between two records is greatest: in time, in the cycle, in the states and in frequency."""
+"""Where a difference between two records is largest: in time, in the cycle, in the states and in frequency."""
 
 from dataclasses import dataclass
 
@@ -8,19 +8,20 @@ from numpy.typing import NDArray
 from rhythmid.compare.pair import Pair, harmonic_columns
 
 Array = NDArray[np.float64]
-HARMONICS = 6  # of the forcing that are listed, and taken out of what may follow the command
-LOUD = 4.0  # times the noise's variance: from there the motions have parted
-PHASES, CELLS = 24, 6  # parts of a cycle; cells along position and along velocity
-SMOOTHED = 4  # bins on either side over which a coherence is averaged
+HARMONICS = 6  # harmonics of the forcing that are listed, and removed before the coherence with the command is computed
+LOUD = 4.0  # ratio to the noise's variance from which the motions count as different
+PHASES, CELLS = 24, 6  # intervals of a cycle; cells along position and along velocity
+SMOOTHED = 4  # bins on either side over which the coherence is averaged
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where the difference is greatest. Shares are of its power; None where unknown.
+    """Where the difference is largest. Shares are of its power; None where unknown.
 
-    `first` and `strongest` [s] on the recording's clock, `growth` the power relative to the motion's in the last quarter over that in the first; `phase` [cycles after the
-    forcing's peak] with its share in the quarter cycle around; `position`, `velocity` of the worst cell; `frequency` [Hz] with
-    its share; `harmonic` of the forcing there; `coherence` with the command there.
+    `first` and `strongest` [s] are on the recording's clock. `growth` compares the last quarter with the first: ratio of the power
+    relative to the motion's. `phase` [cycles after the forcing's peak] has its share in the quarter cycle around it. `position` and
+    `velocity` are those of the worst cell. `frequency` [Hz] has its share, the `harmonic` of the forcing there, and the
+    `coherence` with the command there.
     """
 
     first: float | None
@@ -37,7 +38,7 @@ class Place:
 
 
 def place_of(pair: Pair, difference: Array) -> Place:
-    """Where a difference (n,) is greatest."""
+    """Locate the largest part of a difference (n,)."""
     square = np.where(pair.used, difference**2, 0.0)
     width = max(1, round(1.0 / (pair.frequency * pair.step)))
     local = np.convolve(square, np.ones(width) / width, mode="same")
@@ -75,7 +76,7 @@ def place_of(pair: Pair, difference: Array) -> Place:
 
 
 def _strongest(pair: Pair, difference: Array) -> tuple[float, float, int | None, float | None]:
-    """Strongest frequency of the difference [Hz], its share, the forcing's harmonic there, coherence with the command there."""
+    """Strongest frequency of the difference [Hz], its share, and there the forcing's harmonic and the coherence with the command."""
     n = len(difference)
     window = np.hanning(n)
     power = np.abs(np.fft.rfft((difference - difference.mean()) * window)) ** 2
@@ -92,8 +93,10 @@ def _strongest(pair: Pair, difference: Array) -> tuple[float, float, int | None,
 
 
 def _follows_command(pair: Pair, difference: Array, peak: int) -> float | None:
-    """Coherence of the difference, the forcing's harmonics taken out, with the oscillator's response to the command, around bin
-    `peak`: 1 where the difference is that response, filtered."""
+    """Coherence of the difference with the oscillator's response to the command around bin `peak`.
+
+    The forcing's harmonics are removed first. 1 means that the difference is a filtered version of this response.
+    """
     if pair.command is None or np.ptp(pair.command) == 0.0:
         return None
     rest = difference

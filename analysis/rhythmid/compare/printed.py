@@ -1,4 +1,4 @@
-"""A comparison on the terminal."""
+"""Print a comparison."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +10,7 @@ from rhythmid.report.quantity import plus_minus
 
 
 def show(result: Mapping[str, Any], console: Console) -> None:
-    """Print a comparison as its JSON holds it."""
+    """Print a comparison from its JSON data."""
     alignment = result["alignment"]
     offset = alignment["offset"]
     late = plus_minus(offset["value"], 2.0 * offset["std"])

@@ -1,4 +1,4 @@
-"""How large the command may be: the peak effort, the envelope of the position, and the distortion set the limit."""
+"""The largest command: limited by the peak effort, the envelope of the position, and the distortion."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ from rhythmid.errors import InputError
 
 Limit = Literal["max_effort", "envelope", "max_distortion"]
 NOISE_MARGIN = 5.0  # standard deviations of the measurement that must fit between position and envelope
-STEPS = 14  # of the bisection
-SMALLEST = 1e-3  # share of the largest effort, below which a design is not worth playing
+STEPS = 14  # bisection steps
+SMALLEST = 1e-3  # share of the largest effort below which a design is refused
 
 
 @dataclass(frozen=True)
 class Amplitude:
-    """Peak effort [N], what `limited_by`, and the measured position's range [m], noise left out."""
+    """Peak effort [N], the limit that set it, and the range of the measured position [m] without noise."""
 
     peak: float
     limited_by: Limit
@@ -31,9 +31,9 @@ def largest_amplitude(
     settled: int,
     progress: Callable[[str], None] | None = None,
 ) -> Amplitude:
-    """The largest peak effort that keeps to all limits, to within 0.1 %; `settled` as for `distortion`.
+    """The largest peak effort within all limits, to 0.1 %; `settled` as for `distortion`.
 
-    Raises InputError when the limit cycle alone leaves the envelope, or next to nothing fits within it.
+    Raises InputError when the limit cycle alone leaves the envelope, or when almost no effort fits within it.
     """
     low, high = requirements.envelope
     margin = NOISE_MARGIN * requirements.noise_std

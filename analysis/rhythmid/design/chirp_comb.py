@@ -1,8 +1,8 @@
-"""Time-shifted chirps as a comb: one chirp after another, K of which start at K phases of the forcing, spread evenly.
+"""Time-shifted chirps as a comb: one chirp after another, K of which start at K evenly spread phases of the forcing.
 
-The command repeats after T_c = (n + 1/K) T, so it has lines at the multiples of 1/T_c only, and over K T_c = (Kn + 1) T the
-response of harmonic m falls into bins ≡ m modulo K (the paper's shifted chirps, with K ≥ 2M + 1 so that none coincide;
-two more leave classes empty, in which noise and distortion show).
+The command repeats after T_c = (n + 1/K) T, so that it has lines only at the multiples of 1/T_c. Over K T_c = (Kn + 1) T the
+response of harmonic m falls into bins ≡ m modulo K. These are the paper's shifted chirps, with K ≥ 2M + 1 so that no two responses
+coincide. Two more phases leave classes empty, in which noise and distortion show.
 """
 
 import math
@@ -19,9 +19,9 @@ EMPTY = 2  # classes that no harmonic falls into
 
 
 def chirp_comb(requirements: Requirements, ring_down: float) -> SignalPlan:
-    """The longest comb that fits behind its lead-in; `ring_down` [s] is the machine's.
+    """The longest comb that fits after its lead-in; `ring_down` [s] is the machine's.
 
-    Raises InputError when the run is too short for it, or when its harmonics would fall on one another.
+    Raises InputError when the run is too short, or when harmonics would coincide.
     """
     pumping = 1.0 / requirements.forcing.frequency
     count = requirements.shifts or 2 * requirements.harmonics + 1 + EMPTY
@@ -40,10 +40,12 @@ def chirp_comb(requirements: Requirements, ring_down: float) -> SignalPlan:
     low, high = requirements.band
     cycles = max(
         1, math.floor(0.5 * (low + high) * sweep + 1e-9)
-    )  # whole ones: a chirp ends at zero, without a jump
+    )  # whole chirps: each ends at zero, without a jump
     high = max(2.0 * cycles / sweep - low, low + 1.0 / sweep)
     teeth = count * np.arange(max(1, math.ceil(low * repeat - 1e-9)), math.floor(high * repeat + 1e-9) + 1)
-    teeth = teeth[teeth % periods != 0]  # a tooth on a harmonic of the cycle tells nothing, and is not read
+    teeth = teeth[
+        teeth % periods != 0
+    ]  # a line at a harmonic of the cycle carries no information and is not used
     response = ResponseLines(
         teeth.astype(np.int64), periods, 1.0 / (periods * pumping), requirements.harmonics
     )

@@ -1,7 +1,7 @@
-"""Crest factor of a multisine, and phases that make it small, so that a given peak effort carries the most power.
+"""Crest factor of a multisine, and phases that minimise it, so that a given peak effort carries the most power.
 
-Start: phases of M. R. Schroeder, IEEE Trans. Information Theory 16 (1970) 85, for a spectrum of any shape, and random
-ones. Then time-frequency swapping: clip the signal, keep the phases of what results, restore the amplitudes, repeat
+Starts: the phases of M. R. Schroeder, IEEE Trans. Information Theory 16 (1970) 85, for a spectrum of any shape, and random ones.
+Then time-frequency swapping: clip the signal, keep the resulting phases, restore the amplitudes, repeat
 (E. van der Ouderaa, J. Schoukens, J. Renneboog, IEEE Trans. Instrum. Meas. 37 (1988) 145).
 """
 
@@ -14,11 +14,11 @@ from rhythmid.simulation.signal import fast_length
 
 Array = NDArray[np.float64]
 Lines = NDArray[np.int64]
-# grid points in a period of the highest line; the peak between them is missed by less than 1 %
+# grid points in a period of the highest line; the peak between them is underestimated by less than 1 %
 OVERSAMPLING = 12
-STARTS = 8  # Schroeder's and random ones
-ROUNDS = 1500  # of clipping
-WORK = 150_000_000  # grid points that are gone through; a long period then makes do with fewer starts
+STARTS = 8  # Schroeder's phases and random ones
+ROUNDS = 1500  # clipping iterations
+WORK = 150_000_000  # limit of the total number of grid points processed; a long period has fewer starts
 GENTLEST, HARSHEST = 0.99, 0.80  # clipping level as a share of the peak
 
 
@@ -44,7 +44,7 @@ def one_period(lines: Lines, weights: Array, phases: Array) -> Array:
 
 
 def clipped(lines: Lines, weights: Array, phases: Array, rounds: int = ROUNDS) -> tuple[float, Array]:
-    """Smallest crest factor that clipping reaches from these phases [rad], and its phases."""
+    """Smallest crest factor that clipping reaches from these phases [rad] (n,), and its phases [rad] (n,)."""
     found = phases
     best, chosen = np.inf, phases
     for level in np.linspace(HARSHEST, GENTLEST, rounds):
@@ -62,7 +62,7 @@ def least_crest(
 ) -> tuple[float, Array]:
     """Crest factor and phases [rad] (n,) of the best of several clipped starts; lines (n,) are multiples of 1/period.
 
-    The same for the same `seed`. `weights` (n,) are the lines' relative amplitudes, which stay as they are.
+    Deterministic for a given `seed`. `weights` (n,) are the lines' relative amplitudes, which are kept.
     """
     rng = np.random.default_rng(seed)
     best, phases = np.inf, np.zeros(len(lines))

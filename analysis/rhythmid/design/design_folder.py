@@ -1,7 +1,7 @@
 """A design as a folder that can be run: the command's samples, model and experiment, the prediction, a figure.
 
-`rhythmid run FOLDER/experiment.yaml` plays it over the ROS graph, `rhythmid simulate` without ROS, and the excitation
-node plays the samples on a robot.
+`rhythmid run FOLDER/experiment.yaml` runs it over the ROS graph, `rhythmid simulate` without ROS. On a robot the excitation node
+plays the samples.
 """
 
 import os
@@ -26,7 +26,7 @@ COMMAND, MODEL, EXPERIMENT, PREDICTION, FIGURE = (
 
 
 def command_table(command: Waveform, unit: str) -> str:
-    """The command as an excitation of type `samples` reads it: a line for each sample, seconds and effort."""
+    """The command in the format of an excitation of type `samples`: a line for each sample with seconds and effort."""
     period_ns = round(command.period * 1e9)
     stamps = np.arange(len(command.values), dtype=np.int64) * period_ns
     rows = [
@@ -37,7 +37,7 @@ def command_table(command: Waveform, unit: str) -> str:
 
 
 def experiment_document(design: Design, elements: Sequence[Path] = ()) -> dict[str, Any]:
-    """The experiment file's content: the run that was predicted, within the limits that were asked for."""
+    """The experiment file's content: the predicted run within the given limits."""
     wanted, run = design.requirements, design.experiment
     document: dict[str, Any] = {
         "model": MODEL,
@@ -60,9 +60,9 @@ def experiment_document(design: Design, elements: Sequence[Path] = ()) -> dict[s
 
 
 def save_design(design: Design, model: Path | str, folder: Path, elements: Sequence[Path] = ()) -> None:
-    """Write the design into a new folder, whole or not at all; `model` is the file it was made from, or its text.
+    """Write the design into a new folder, completely or not at all; `model` is the file it was made from, or its text.
 
-    Folders above it that are missing are made. Raises InputError when the folder cannot be written.
+    Missing parent folders are created. Raises InputError when the folder cannot be written.
     """
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)

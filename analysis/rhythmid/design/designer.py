@@ -1,4 +1,4 @@
-"""Design an experiment: a signal whose responses stay apart, as large as the machine bears, and what it will tell."""
+"""Design an experiment: a signal with separable responses, as large as the machine allows, and its predicted accuracy."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,19 +35,19 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 Array = NDArray[np.float64]
-LOOKED_AT = range(1, 9)  # harmonics that may stand out of the noise
-STRONG = 0.05  # distortion, as a share of the response, that deserves a word
-BIASED = 1.0  # standard deviations of bias that deserve a word
+LOOKED_AT = range(1, 9)  # harmonics whose visibility above the noise is checked
+STRONG = 0.05  # distortion, as a share of the response, from which a note is given
+BIASED = 1.0  # bias [standard deviations] from which a note is given
 
 
 @dataclass(frozen=True, eq=False)
 class Design(Result):
-    """An experiment ready to be played, with what is predicted of it.
+    """An experiment ready to run, with its predictions.
 
     Attributes
     ----------
     requirements
-        What was asked for.
+        The given requirements.
     plan
         Frequencies and phases of the signal.
     command
@@ -63,9 +63,9 @@ class Design(Result):
     distortion
         Nonlinear part of the response, as a share of it.
     bias
-        Of a fit to transfer functions, in standard deviations of each parameter.
+        Bias of a fit to transfer functions, in standard deviations of each parameter.
     visible
-        Harmonics |m| of the response that will stand out of the noise.
+        Harmonics |m| of the response that will be visible above the noise.
     output, still
         Measured position without noise, with and without command; float64[n], [m].
     """
@@ -85,7 +85,7 @@ class Design(Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know, one line each."""
+        """Notes for the user, one line each."""
         found = []
         if self.distortion.total > STRONG:
             found.append(
@@ -130,7 +130,7 @@ class Design(Result):
         return {"estimates": [{"name": name} | one.to_dict() for name, one in known.items()]}
 
     def show(self, console: "Console") -> None:
-        """Print the prediction and what the run will do."""
+        """Print the prediction and a description of the run."""
         from rhythmid.design.printed import show
 
         show(self.to_dict(), console)
@@ -194,7 +194,7 @@ def with_delays(model: Model, requirements: Requirements, catalogue: Catalogue) 
 
 
 def planned_experiment(model: Model, command: Waveform, requirements: Requirements) -> Experiment:
-    """The run of this command, in simulated time, as the experiment file will describe it."""
+    """The run of this command in simulated time, as the experiment file will describe it."""
     return Experiment(
         without_forcing(model), Path("model.yaml"), command, {"type": "samples"},
         forcing=requirements.forcing, input_delay=Delay(requirements.input_delay),
@@ -209,7 +209,7 @@ def design(
     catalogue: Catalogue | None = None,
     progress: Tell | None = None,
 ) -> Design:
-    """Design a run of the `model`, whose values are taken for the truth.
+    """Design a run of the `model`, whose values are assumed to be true.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""How far the response departs from being linear in the command, and what that does to a fit of the linearised machine.
+"""Nonlinear part of the response to the command, and the resulting bias of a fit of the linearised machine.
 
-With y(A) the output under a command of peak A, the even part of the response is (y(A) + y(−A))/2 − y(0), and that of the
-odd part which is not linear follows from runs at A and A/2, its leading term being of third order. The joint fit
-simulates the nonlinear machine, and neither biases it; whatever is read off transfer functions, both do.
+With y(A) the output under a command of peak A, the even part of the response is (y(A) + y(−A))/2 − y(0). The nonlinear part of the
+odd response follows from runs at A and A/2, assuming that its leading term is of third order. The joint fit simulates the nonlinear
+machine, so that neither part biases it. Both parts bias results that are read off transfer functions.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Distortion:
-    """`even` and `odd` nonlinear parts of the response, rms as shares of its linear part's; `signal` (n,) their sum [m]."""
+    """`even` and `odd` nonlinear parts of the response, as ratios of rms to the linear part; `signal` (n,) is their sum [m]."""
 
     even: float
     odd: float

@@ -1,4 +1,4 @@
-"""The picture of a design: the command, the motion, and both spectra with the harmonics of the forcing."""
+"""The figure of a design: the command, the motion, and both spectra with the harmonics of the forcing."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 from rhythmid.design.designer import Design
 
 Array = NDArray[np.float64]
-SHOWN_PERIODS = 4  # of the forcing that the motion is shown over
-CYCLES = 60  # of the highest frequency that the command is shown over; more would be a block of ink
+SHOWN_PERIODS = 4  # forcing periods over which the motion is drawn
+CYCLES = (
+    60  # periods of the highest frequency over which the command is drawn; more could not be distinguished
+)
 COLOURS = {0: "black", 1: "tab:blue", 2: "tab:green", 3: "tab:orange", 4: "tab:red"}
-DEEPEST = 1e-2  # of the noise floor, below which nothing is drawn
+DEEPEST = 1e-2  # share of the noise floor below which nothing is drawn
 
 
 def _over_window(design: Design, signal: Array) -> Array:
@@ -24,7 +26,7 @@ def _over_window(design: Design, signal: Array) -> Array:
 
 
 def _harmonics(axis: Axes, design: Design) -> None:
-    """Vertical lines at the harmonics of the forcing, and the axis up to the last response."""
+    """Vertical lines at the harmonics of the forcing; the axis ends at the last response."""
     top = design.requirements.band[1] + design.requirements.harmonics * design.requirements.forcing.frequency
     frequency = design.requirements.forcing.frequency
     for n in range(1, int(top / frequency) + 1):
@@ -34,7 +36,7 @@ def _harmonics(axis: Axes, design: Design) -> None:
 
 
 def draw_command(axis: Axes, design: Design) -> None:
-    """The command over one repetition, or less where that is long, with its limits."""
+    """The command over one repetition, or a part of it if it is long, with its limits."""
     first = round(design.plan.lead_in * design.requirements.rate)
     length = min(design.plan.repeat, CYCLES / design.requirements.band[1])
     shown = slice(first, first + round(length * design.requirements.rate))

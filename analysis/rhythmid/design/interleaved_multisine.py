@@ -1,7 +1,7 @@
-"""Interleaved multisine: equally spaced odd lines, placed so that every response line belongs to one line and harmonic.
+"""Interleaved multisine: equally spaced odd lines, placed so that every response line belongs to one line and one harmonic.
 
-The period holds an even number P of pumping periods, so the responses of odd lines, at all harmonics, are odd, and even
-distortion falls on even bins. Of every four lines one, drawn at random, is left out: what shows at it is odd distortion
+The period holds an even number P of pumping periods. The responses of odd lines at all harmonics are therefore odd, and even
+distortion falls on even bins. One of every four lines, drawn at random, is left out; a response there is odd distortion
 (the random-odd grid of R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., 2012,
 section 4.3). Equal spacing allows a small crest factor.
 """
@@ -19,13 +19,13 @@ from rhythmid.design.signal_plan import SignalPlan, duration_for, lead_in, short
 from rhythmid.errors import InputError
 from rhythmid.excitation.multisine import Multisine
 
-REPEATS = 2  # of the period: what differs between them is noise
-GROUP = 4  # of lines, one of which is left out
-FEWEST_LINES = 4  # lines that are worth the name
+REPEATS = 2  # repetitions of the period: differences between them are noise
+GROUP = 4  # lines in a group, one of which is left out
+FEWEST_LINES = 4  # minimum number of lines
 
 
 def _pumping_periods(requirements: Requirements, ring_down: float) -> tuple[int, int]:
-    """Pumping periods P in a period of the multisine, even, and its repeats. Raises InputError where none fit."""
+    """Even number P of pumping periods in the multisine's period, and its repeats. Raises InputError where none fits."""
     frequency = requirements.forcing.frequency
     available = (requirements.duration - lead_in(requirements, ring_down)) * frequency
     least = 2 * math.ceil(0.5 * shortest_repeat(ring_down) * frequency)
@@ -63,8 +63,10 @@ def spaced_lines(first: int, last: int, spacing: int) -> Lines:
 
 
 def closest_lines(low: int, high: int, periods: int, harmonics: int, spacings: range) -> Lines | None:
-    """Odd lines within bins low … high, the most closely spaced whose responses all have a bin of their own; None where no
-    four of them do."""
+    """The most closely spaced odd lines in bins low … high whose responses all have separate bins.
+
+    None where there are fewer than `FEWEST_LINES` of them.
+    """
     for spacing in spacings:
         for first in range(low | 1, min(low + spacing, high) + 1, 2):
             lines = spaced_lines(first, high, spacing)
@@ -74,7 +76,7 @@ def closest_lines(low: int, high: int, periods: int, harmonics: int, spacings: r
 
 
 def thinned(lines: Lines, seed: int) -> Lines:
-    """The lines without one of every four, drawn at random, for odd distortion to show; all where they are few."""
+    """The lines without one of every four, drawn at random, so that odd distortion shows; all lines where they are few."""
     if len(lines) < 2 * GROUP:
         return lines
     rng = np.random.default_rng(seed)
@@ -84,8 +86,10 @@ def thinned(lines: Lines, seed: int) -> Lines:
 
 @dataclass(frozen=True, eq=False)
 class Interleaving:
-    """Excited `lines`, those of the `spaced` ones that are left out, in bins of one over the period, which holds `periods` P
-    pumping periods and comes `repeats` times."""
+    """Equally `spaced` lines and the excited `lines` among them, as multiples of 1/period.
+
+    The period holds `periods` P pumping periods and is repeated `repeats` times.
+    """
 
     spaced: Lines
     lines: Lines
@@ -94,9 +98,9 @@ class Interleaving:
 
 
 def interleaved(requirements: Requirements, ring_down: float) -> Interleaving:
-    """The most closely spaced lines of the longest period that fits twice behind its lead-in; `ring_down` [s] is the machine's.
+    """The most closely spaced lines of the longest period that fits twice after its lead-in; `ring_down` [s] is the machine's.
 
-    Raises InputError when the run is too short for it, or when responses would fall on one another.
+    Raises InputError when the run is too short, or when responses would coincide.
     """
     periods, repeats = _pumping_periods(requirements, ring_down)
     period = periods / requirements.forcing.frequency

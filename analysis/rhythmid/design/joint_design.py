@@ -1,10 +1,10 @@
-"""Design references for a machine of several joints, and predict what its base parameters will be known to.
+"""Design references for a machine of several joints, and predict the accuracy of its base parameters.
 
-Each joint gets a multisine of random phases about the middle of its range; the joints' lines are interleaved, so that their references
-are orthogonal over a period. Of several draws of the phases the one is taken whose regression has the greatest determinant (J. Swevers,
-C. Ganseman, D. B. Tükel, J. De Schutter, H. Van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730). The run is then simulated, the references
-being made smaller until the joints' forces are within the limit, and the Fisher information of the inverse dynamics along the simulated
-motion, white noise on the measured forces being what limits it, gives every standard deviation.
+Each joint gets a multisine with random phases about the middle of its range. The joints' lines are interleaved, so that their
+references are orthogonal over a period. Of several draws of the phases the one is taken whose regression has the largest determinant
+(J. Swevers, C. Ganseman, D. B. Tükel, J. De Schutter, H. Van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730). The run is then
+simulated, and the references are reduced until the joints' forces are within the limit. The Fisher information of the inverse
+dynamics along the simulated motion, with white noise on the measured forces, gives every standard deviation.
 """
 
 from collections.abc import Mapping
@@ -31,27 +31,29 @@ from rhythmid.progress import Tell
 from rhythmid.record.joint_record import JointRecord
 
 Array = NDArray[np.float64]
-PERIODS_IN_A_RUN = 2  # of the multisines in a run: what repeats shows the noise
-MARGIN = 0.1  # of a joint's travel that references keep away from its ends: overshoot of the controllers
-DRAWS = 20  # of the phases, of which the best is taken
-POSES = 200  # of a period at which draws are compared
-SMALLER = 0.8  # times by which references are made smaller at a time
-SMALLEST = 0.02  # of the travel: with less a joint does not move
+PERIODS_IN_A_RUN = 2  # repetitions of the multisines in a run, whose differences show the noise
+MARGIN = (
+    0.1  # share of a joint's travel at either end that references leave free for the controllers' overshoot
+)
+DRAWS = 20  # draws of the phases, of which the best is taken
+POSES = 200  # poses of a period at which draws are compared
+SMALLER = 0.8  # factor of each reduction of the references
+SMALLEST = 0.02  # smallest share of the travel: with less a joint does not move
 
 
 @dataclass(frozen=True)
 class JointRequirements:
-    """What a run is to keep to.
+    """Requirements of a run.
 
     Attributes
     ----------
-    duration : of the run [s].
+    duration : length of the run [s].
     band : lowest and highest frequency of the references [Hz].
     max_effort : largest force at any joint [N*m or N].
     noise_std : standard deviation of a measured force [N*m or N].
-    rate : of commands and measurements [Hz].
-    envelope : range of joints whose file states none, about the reference pose [rad or m].
-    seed : of the draws.
+    rate : rate of commands and measurements [Hz].
+    envelope : range, about the reference pose, of joints whose file states none [rad or m].
+    seed : seed of the random phases.
     """
 
     duration: float
@@ -65,8 +67,11 @@ class JointRequirements:
 
 @dataclass(frozen=True)
 class JointDesign:
-    """An experiment and what is predicted of it: `peak` force by joint, `parameters` of the paths, and the base parameters of the links
-    with their standard deviations."""
+    """An experiment and its predictions.
+
+    `peak` is the largest force by joint, `parameters` are those of the paths. The base parameters of the links have their
+    standard deviations.
+    """
 
     experiment: JointExperiment
     excitation: Mapping[str, Mapping[str, Any]]
@@ -85,7 +90,10 @@ class JointDesign:
 
 
 def design_joints(machine: Machine, wanted: JointRequirements, tell: Tell = lambda _: None) -> JointDesign:
-    """References for a machine under its controllers. Raises InputError where a joint has none, or no range, or the forces stay too large."""
+    """References for a machine under its controllers.
+
+    Raises InputError where a joint has no controller or no range, or where the forces stay too large.
+    """
     for joint in machine.joints:
         if not machine.controlled(joint):
             raise InputError(f"{joint}: has no position_control, so that no reference can be designed for it")
@@ -110,7 +118,7 @@ def design_joints(machine: Machine, wanted: JointRequirements, tell: Tell = lamb
 
 
 def _range(machine: Machine, joint: str, envelope: tuple[float, float] | None) -> tuple[float, float]:
-    """Positions that a joint may take: those of the body's file, else the envelope about the reference pose."""
+    """Positions that a joint may take: the range in the body's file, else the envelope about the reference pose."""
     body = machine.body
     model, place = body.model, body.joints[joint].position
     number = int(np.flatnonzero(model.jnt_qposadr == place)[0])
@@ -128,7 +136,7 @@ def _range(machine: Machine, joint: str, envelope: tuple[float, float] | None) -
 def _excitation(
     machine: Machine, wanted: JointRequirements, ranges: Mapping[str, tuple[float, float]], seed: int, share: float
 ) -> dict[str, dict[str, Any]]:  # fmt: skip
-    """The excitation of each joint as an experiment's file has it."""
+    """The excitation of each joint, in the format of an experiment's file."""
     period = wanted.duration / PERIODS_IN_A_RUN
     found: dict[str, dict[str, Any]] = {}
     for place, joint in enumerate(machine.joints):
@@ -169,7 +177,7 @@ def _seen(
     time = np.linspace(0.0, wanted.duration / PERIODS_IN_A_RUN, POSES, endpoint=False)
     pose = np.tile(body.reference, (POSES, 1))
     rate, acceleration = np.zeros((POSES, body.model.nv)), np.zeros((POSES, body.model.nv))
-    step = 1e-3  # [s] of the differences: references are smooth
+    step = 1e-3  # step of the differences [s]; references are smooth
     for joint, one in experiment.excitation.items():
         before, now, after = (one(time + shift) for shift in (-step, 0.0, step))
         own = body.joints[joint]
@@ -189,7 +197,7 @@ def _seen(
 
 
 def rehearsed(machine: Machine, experiment: JointExperiment) -> tuple[JointRecord | None, dict[str, float]]:
-    """What the run would record without noise, and the largest force at each joint; no record of one that diverges."""
+    """The noise-free record of the run and the largest force at each joint; no record where the run diverges."""
     try:
         made = perform(machine, experiment)
     except InputError:
@@ -203,9 +211,9 @@ def rehearsed(machine: Machine, experiment: JointExperiment) -> tuple[JointRecor
 def predicted(
     machine: Machine, record: JointRecord, noise_std: float
 ) -> tuple[dict[str, JointEstimate], InertialEstimate]:
-    """Standard deviations of the paths' parameters and of the base parameters, from a record without noise of the machine itself.
+    """Standard deviations of the paths' parameters and of the base parameters, from the machine's own noise-free record.
 
-    `noise_std` is that of a measured force, from sample to sample independent.
+    `noise_std` is that of a measured force; noise is independent from sample to sample.
     """
     balances = JointBalances.of(machine, [record])
     rotors = {
@@ -220,7 +228,7 @@ def predicted(
         balance = balances.balance(joint)
         fit = fit_effort(balance, balances.models[joint], steps=0)
         spacing = float(np.median(np.diff(balance.places[0]))) * balance.motions[0].period
-        # the low-pass leaves of white noise what each row would have, were the rows independent
+        # standard deviation of low-passed white noise in each row, if the rows counted as independent
         scale = noise_std * np.sqrt(sampled / spacing)
         fits[joint] = balance, replace(fit, scale=scale, correlation=1.0)
         normal = fit.jacobian.T @ fit.jacobian / scale**2 + np.diag(fit.precision)
@@ -236,7 +244,7 @@ def predicted(
 
 
 def save_joint_design(found: JointDesign, machine: Machine, model: Path, folder: Path) -> None:
-    """Write `experiment.yaml`, to be played with `rhythmid run`, and `signals.yaml`, with which its bag is identified."""
+    """Write `experiment.yaml` for `rhythmid run`, and `signals.yaml`, with which its bag is identified."""
     import os
 
     import yaml

@@ -1,4 +1,4 @@
-"""What a run will tell, before it is run: the Cramér-Rao bound at the model's own values, for every free parameter."""
+"""Predicted accuracy of a run: the Cramér-Rao bound at the model's own values, for every free parameter."""
 
 import math
 from collections.abc import Mapping
@@ -22,8 +22,7 @@ from rhythmid.record.record import Record
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """The `record` that the run would make without noise, and the `fit` that it allows: its standard deviations are the
-    bound."""
+    """The noise-free `record` of the run, and the `fit` to it, whose standard deviations are the bound."""
 
     record: Record
     fit: Fit
@@ -63,7 +62,7 @@ def predict(model: Model, experiment: Experiment, noise_std: float) -> Predictio
 
 
 def require_unambiguous_delays(cycle: LimitCycle, longest: float) -> None:
-    """Refuse delays up to `longest` [s] where others give the very same record: shifts by T/gcd of the cycle's harmonics."""
+    """Refuse delays up to `longest` [s] that are ambiguous: shifts by T/gcd of the cycle's harmonics give the same record."""
     lines = np.abs(cycle.harmonics(8)[1:])
     seen = [n + 1 for n in range(len(lines)) if lines[n] > SEEN * lines.max()]
     shift = cycle.pumping.period / reduce(math.gcd, seen)

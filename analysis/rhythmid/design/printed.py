@@ -1,4 +1,4 @@
-"""A design on the terminal."""
+"""Print a design."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,7 +9,7 @@ from rhythmid.report.terminal_table import print_estimates
 
 
 def show(result: Mapping[str, Any], console: Console) -> None:
-    """Print a design as its JSON holds it."""
+    """Print a design from its JSON data."""
     rows = result["parameters"] | {f"delay: {name}": estimate for name, estimate in result["delays"].items()}
     print_estimates(console, "predicted standard deviations", rows, "name")
     size, position, signal, bent = (result[key] for key in ("amplitude", "position", "signal", "distortion"))

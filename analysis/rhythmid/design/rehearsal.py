@@ -1,4 +1,4 @@
-"""The planned run, simulated at any amplitude and without noise: what the machine would do."""
+"""Simulation of the planned run, at any amplitude and without noise."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -13,7 +13,7 @@ from rhythmid.offline_run import perform
 from rhythmid.settings import Noise, Safety
 
 Array = NDArray[np.float64]
-KEPT = 8  # simulated runs that are remembered
+KEPT = 8  # simulated runs that are cached
 
 
 class Rehearsal:
@@ -25,7 +25,7 @@ class Rehearsal:
         self.output = lru_cache(maxsize=KEPT)(self._output)
 
     def _output(self, amplitude: float) -> Array:
-        """Measured position [m] (n,) with the command's peak at `amplitude` [N]; negative turns the command over."""
+        """Measured position [m] (n,) with the command's peak at `amplitude` [N]; a negative one inverts the command."""
         command = self._waveform.with_peak(amplitude)
         done = perform(replace(self._experiment, excitation=command))["joint_states"].position
         if done is None or not np.isfinite(done).all():

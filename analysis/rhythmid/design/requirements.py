@@ -1,4 +1,4 @@
-"""What a user asks of an experiment before it is designed."""
+"""The user's requirements of an experiment to be designed."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ KINDS: tuple[Kind, ...] = ("comb", "multisine")
 
 @dataclass(frozen=True)
 class Requirements:
-    """Length, limits and circumstances of the run to be designed.
+    """Length, limits and conditions of the run to be designed.
 
     Attributes
     ----------
@@ -34,13 +34,13 @@ class Requirements:
     rate
         Samples per second [Hz].
     harmonics
-        M: the responses at ω + mω_p, |m| ≤ M, are to stay apart.
+        M: the responses at ω + mω_p, |m| ≤ M, must not coincide.
     forcing
         Periodic force made on the robot.
     input_delay, measurement_delay
-        As expected [s].
+        Expected delays [s].
     longest_delay
-        The longest that either may be [s].
+        Upper limit of either delay [s].
     max_distortion
         Largest share of the response that its nonlinear part may reach; None for any.
     shifts
@@ -48,7 +48,7 @@ class Requirements:
     period, spacing
         Period [s] and spacing of the lines [Hz] of a multisine; chosen where None.
     seed
-        Of the random phases.
+        Seed of the random phases.
 
     Raises
     ------

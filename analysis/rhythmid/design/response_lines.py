@@ -1,6 +1,6 @@
-"""Where the responses to the lines of a command fall, and whether any two fall on one another.
+"""Bins of the responses to the lines of a command, and whether any two of them coincide.
 
-A machine pumped at ω_p answers a line at ω with lines at ω + mω_p, and at the mirror images −ω + mω_p. Over a window of P
+A machine pumped at ω_p responds to a line at ω with lines at ω + mω_p, and at the mirror images −ω + mω_p. Over a window of P
 pumping periods these are the bins |l + mP|. Harmonic transfer functions can be read off line by line only where all of
 them differ, and differ from the limit cycle's own bins nP (E. Louarroudi et al., IEEE TIM 61(5), 2012).
 """
@@ -17,8 +17,11 @@ Lines = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class ResponseLines:
-    """Excited bins `lines` (n,) of width `resolution` [Hz] in a window of `periods` P pumping periods, and the largest harmonic
-    M that is to stay apart."""
+    """Excited bins of a command and the bins of its responses.
+
+    `lines` (n,) are bins of width `resolution` [Hz] in a window of `periods` P pumping periods; responses up to the harmonic M
+    must not coincide.
+    """
 
     lines: Lines
     periods: int
@@ -59,7 +62,7 @@ class ResponseLines:
             )
         for nearest in range(
             1, self.harmonics + 1
-        ):  # the fewer the harmonics between them, the plainer the case
+        ):  # with few harmonics between them the example is the clearest
             rows = np.flatnonzero(np.abs(self.orders) <= nearest)
             order = np.argsort(bins[rows], axis=None, kind="stable")
             same = np.flatnonzero(np.diff(bins[rows].ravel()[order]) == 0)

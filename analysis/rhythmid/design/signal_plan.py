@@ -1,4 +1,4 @@
-"""What both kinds of signal have in common: a command that repeats, a lead-in until the response does, a window after it."""
+"""Common parts of both kinds of signal: a repeated command, a lead-in until the response repeats, and a window after it."""
 
 import math
 from collections.abc import Mapping
@@ -15,10 +15,10 @@ LONGEST_LEAD_IN = 0.25  # of the duration
 
 @dataclass(frozen=True, eq=False)
 class SignalPlan:
-    """A command of any size, to be scaled.
+    """A command of arbitrary size, to be scaled.
 
-    `repeat` [s] after which the command is the same again; `repeats` of them, or of a whole comb, make the window over
-    which `response` tells where its lines fall; `lead_in` [s] comes before. `facts` are what is worth telling of it.
+    The command repeats after `repeat` [s]. `repeats` repetitions, or a whole comb, form the window in which `response` tells the
+    bins of the response lines. `lead_in` [s] comes before. `facts` are notes for the user.
     """
 
     excitation: Excitation
@@ -36,11 +36,11 @@ def lead_in(requirements: Requirements, ring_down: float) -> float:
 
 
 def shortest_repeat(ring_down: float) -> float:
-    """π τ [s]: then the lines are as close as a resonance that rings down with τ is wide at half its power."""
+    """π τ [s]: the line spacing then equals the half-power width of a resonance that rings down with the time constant τ."""
     return math.pi * ring_down
 
 
 def duration_for(window: float, requirements: Requirements, ring_down: float) -> float:
-    """Shortest run [s] that holds such a window [s] after its lead-in."""
+    """Shortest run [s] that holds this window [s] after its lead-in."""
     needed = window + 2.0 * requirements.longest_delay
     return min(needed + RING_DOWNS * ring_down, needed / (1.0 - LONGEST_LEAD_IN))

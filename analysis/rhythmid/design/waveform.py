@@ -1,4 +1,4 @@
-"""A command as the samples that will be played, in memory."""
+"""A command in memory, as the samples to be played."""
 
 import math
 
@@ -9,12 +9,12 @@ from rhythmid.design.crest_factor import crest_factor
 from rhythmid.errors import InputError
 from rhythmid.excitation.excitation import Array, Excitation
 
-DIGITS = 10  # kept of the largest effort; so a file is short and says exactly what was predicted
-BELOW = 1.0 - 1e-9  # rounding must not carry a peak beyond the limit
+DIGITS = 10  # digits kept, relative to the largest effort; the file is short and holds exactly the values of the prediction
+BELOW = 1.0 - 1e-9  # factor that keeps a rounded peak within the limit
 
 
 class Waveform(Excitation):
-    """Sample k [N] is held from k periods [s] on until the next."""
+    """Sample k [N] is held from time k · period [s] until the next sample."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 

@@ -1,5 +1,8 @@
-"""Which records a diagnosis can use: what does not say where the machine was is left out, what drives the machine has to be known, and
-records of one diagnosis have to come from one machine in one set of units."""
+"""Select and clean the records that a diagnosis can use.
+
+Samples that do not tell where the machine was are left out. The channel that drives the machine has to be known.
+All records of one diagnosis have to come from one machine and use one set of units.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,15 +23,15 @@ from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-DECAYS = 0.7  # of the motion's size from the first quarter to the last, above which it may be driven unless it shrinks steadily
+DECAYS = 0.7  # ratio of the motion's size in the last quarter to that in the first; above it the motion may be driven
 
 
 @dataclass(frozen=True)
 class Admitted:
-    """Records and held-out records as they are judged, and what there is to say of them.
+    """Cleaned records and held-out records, with notes for the user.
 
-    `records` and `holdout` are cut where commands are missing, as a simulation needs them; `whole_records` and `whole_holdout` are
-    not, for effort is balanced at each instant, and `whole_notes` say nothing of cuts.
+    `records` and `holdout` are cut where commands are missing, because a simulation needs them. `whole_records` and
+    `whole_holdout` are not cut, because effort is balanced at each instant; `whole_notes` do not mention cuts.
     """
 
     records: tuple[Record, ...]
@@ -40,10 +43,10 @@ class Admitted:
 
 
 def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model) -> Admitted:
-    """The records and the held-out ones made tidy, driven by what drives the model, and cut where that is missing.
+    """Clean the records and the held-out ones, attach the channel that drives the model, and cut where it is missing.
 
-    Those in which the machine stands still are left out. Raises InputError for records that cannot be judged, and where it stands still in
-    all that are to be fitted, or in all held-out ones.
+    Records in which the machine stands still are left out. Raises InputError for records that cannot be judged, and
+    where the machine stands still in all records to be fitted or in all held-out ones.
     """
     whole = (*records, *holdout)
     remark = check_driven(whole, model)
@@ -78,7 +81,7 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
 
 
 def check_driven(records: Sequence[Record], model: Model) -> str | None:
-    """A remark where what drives the machine is not recorded, as far as that shows: a free decay needs nothing that does."""
+    """A note where the channel that drives the machine seems to be missing; a free decay needs none."""
     if model.term("periodic_forcing") is not None:
         return None
     for record in records:

@@ -1,8 +1,8 @@
-"""Other kinds of explanation beside the search's effects: a wrong fixed value, a longer delay, an effect in another place.
+"""Explanations other than the search's effects: a wrong fixed value, a longer delay, an effect in another slot.
 
-A mass that is given wrongly is missed like physics, and a lag is one law wherever in the path it sits, though the catalogue may
-have it in one place only. Kin of a chosen effect (the other lags, the other laws of friction) explain the same by other means.
-Each is a hypothesis like any other, fitted and scored in the same way.
+A wrong fixed mass looks like missing physics. A lag obeys the same law anywhere in the signal path, though the
+catalogue may hold it in one slot only. Other elements of a chosen effect's family (other lags, other friction laws)
+may explain the same mismatch. Each alternative is fitted and scored like any other hypothesis.
 """
 
 import math
@@ -32,9 +32,13 @@ from rhythmid.simulation.generated_source import DRIVES
 from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
-SIGNALS: tuple[Slot, ...] = ("command", "actuator", "sensor")  # what a law with times acts on
-CLOCKS: tuple[Slot, ...] = ("command", "timing")  # what has a delay that may drift
-LONGER = (2.0, 5.0, 12.0, 30.0)  # samples, at which a longer delay is sought
+SIGNALS: tuple[Slot, ...] = (
+    "command",
+    "actuator",
+    "sensor",
+)  # slots for a law whose only parameters are times
+CLOCKS: tuple[Slot, ...] = ("command", "timing")  # slots for a delay that may drift
+LONGER = (2.0, 5.0, 12.0, 30.0)  # [samples] first guesses of a longer delay
 
 
 def alternatives(
@@ -50,10 +54,10 @@ def alternatives(
     reach: float = math.inf,
     tell: Tell = silent,
 ) -> list[tuple[Trial, Kind]]:
-    """Fitted trials of other kinds, for the nominal model and in the place of the chosen effects.
+    """Fit models of other kinds: alternatives to the nominal model and replacements for the chosen effects.
 
-    `known` is the chosen run, `rounds` are the search's scores, and `weighed` the models that are hypotheses already. One whose chi2 would not
-    come to `reach` is not carried to convergence.
+    `known` is the run of the chosen model, `rounds` are the search's scores, and `weighed` are the models that are
+    hypotheses already. A trial whose chi2 would not reach `reach` is not carried to convergence.
     """
     sizes = scales(series, chosen.model)
     freed: list[Proposal] = list(_freed(nominal))
@@ -87,8 +91,10 @@ def alternatives(
 
 
 def _reduced(chosen: Trial, weighed: Sequence[Trial]) -> Iterator[Proposal]:
-    """Models that fit better than the chosen one, without each of their effects in turn: one effect may carry all the gain, and
-    have found its deepest minimum only beside another."""
+    """Models that fit better than the chosen one, with each of their effects removed in turn.
+
+    One effect may carry the whole gain, but the fit may have found its deepest minimum only beside another effect.
+    """
     known = {tuple(sorted(trial.added)) for trial in weighed}
     for trial in weighed:
         if len(trial.added) < 2 or trial.chi2 >= chosen.chi2:
@@ -102,8 +108,11 @@ def _reduced(chosen: Trial, weighed: Sequence[Trial]) -> Iterator[Proposal]:
 
 
 def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Trial]) -> Iterator[Proposal]:
-    """The model with another element of the same family in the place of an effect, as far as one has scored in any round and
-    is no hypothesis yet; beginning where the family's other members have ended, too."""
+    """The base model with other elements of the family of `term`.
+
+    Only elements that scored in some round and are no hypothesis yet are proposed. The first guesses include the fitted
+    values of the other members of the family.
+    """
     family = term.element.family
     scored: dict[str, list[Score]] = {}
     for one in sorted((s for r in rounds for s in (*r.scores, *r.local)), key=lambda s: -s.statistic):
@@ -132,13 +141,13 @@ def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Tri
 
 
 def _renamed(parameter: str, label: str, own: str) -> str:
-    """A parameter's name with another label in the place of an effect's."""
+    """A parameter's name with the label of its effect replaced by `own`."""
     term, _, name = parameter.rpartition(".")
     return f"{own}.{name}" if term == label else parameter
 
 
 def _base(chosen: Trial, rest: tuple[str, ...]) -> Trial:
-    """The chosen trial with only these of its effects, and of them those that need no other one, as a place to start from."""
+    """The chosen trial reduced to the effects `rest`, as a start; effects that need a removed one are dropped, too."""
     model = chosen.model
     for label in chosen.added:
         if label not in rest:
@@ -153,7 +162,7 @@ def _freed(base: Trial) -> Iterator[Proposal]:
 
 
 def fixed_values(model: Model, effects: Sequence[str] = ()) -> list[str]:
-    """Parameters of the nominal model that are held fixed because its author says so, not by their nature, and are not zero."""
+    """Nonzero parameters that the author of the nominal model has fixed, and that are not fixed by their nature."""
     names = [INERTIA] if model.mass.fixed else []
     for term in model.terms:
         for key, value in term.values.items():
@@ -163,7 +172,7 @@ def fixed_values(model: Model, effects: Sequence[str] = ()) -> list[str]:
 
 
 def _longer_delay(base: Trial, series: Sequence[Series]) -> Iterator[Proposal]:
-    """The model with its input's delay no longer held near the sample that a nuisance may take."""
+    """The model with its input delay freed from the prior and the bounds of a nuisance delay."""
     delay = base.model.parameters.get(INPUT_DELAY)
     if delay is None or delay.prior is None:
         return
@@ -178,7 +187,7 @@ def _longer_delay(base: Trial, series: Sequence[Series]) -> Iterator[Proposal]:
 
 
 def _one_law(chosen: Trial, known: Trajectories, sizes: Scales) -> Iterator[Proposal]:
-    """The chosen model with a free map in the place of several effects that are laws of the same quantity."""
+    """The chosen model with one free map instead of several effects that are laws of the same quantity."""
     for (slot, quantity), laws in laws_of(chosen, sizes).items():
         name = {"actuator": "effort", "sensor": "signal"}.get(slot, quantity)
         if len(laws) < SERIES or name not in FREE_MAPS:
@@ -189,7 +198,7 @@ def _one_law(chosen: Trial, known: Trajectories, sizes: Scales) -> Iterator[Prop
 
 
 def _free_places(element: Element, catalogue: Catalogue) -> Iterator[Slot]:
-    """Other places where the element would make sense, and where the catalogue has none of its family."""
+    """Other slots in which the element makes sense and for which the catalogue has no element of its family."""
     for place in _places(element):
         there = [one for one in catalogue.values() if one.slot == place and one.candidate]
         if place != element.slot and element.family not in {one.family for one in there if one.family}:
@@ -197,8 +206,10 @@ def _free_places(element: Element, catalogue: Catalogue) -> Iterator[Slot]:
 
 
 def _places(element: Element) -> tuple[Slot, ...]:
-    """Places where the law of the element would make sense, its own among them: only effects that know times or rates of them
-    but no sizes have the same parameters in every place."""
+    """Slots in which the element's law makes sense, its own among them.
+
+    Only laws whose parameters are times or rates of time, and not sizes, have the same parameters in every slot.
+    """
     units = {parameter.unit for parameter in element.parameters}
     if element.delay is not None and units == {"1"}:
         return CLOCKS
@@ -214,12 +225,12 @@ def _places(element: Element) -> tuple[Slot, ...]:
 
 
 def moved_name(name: str, place: Slot) -> str:
-    """What the law of an element is called in another place than its own."""
+    """Name of an element's law in a slot other than its own."""
     return f"{name}_of_the_{place}"
 
 
 def _moved(base: Trial, term: Term, place: Slot) -> Proposal:
-    """The model with one of its effects in another place."""
+    """The model with one of its effects moved to another slot."""
     measured = place == "sensor"
     element = replace(
         term.element,

@@ -1,7 +1,7 @@
-"""Calibration: refit everything that the nominal model already has before asking what it lacks.
+"""Calibration: refit all free parameters of the nominal model before asking what it lacks.
 
-Parameters that are wrong are not missing physics. Neither is a delay, nor an input that the recording reconstructs
-otherwise than by holding it: those are found here and told apart from effects.
+Wrong parameters are not missing physics. Neither is a delay, nor an input that is recorded as held but is not held.
+Both are detected here and kept apart from effects.
 """
 
 import math
@@ -28,17 +28,17 @@ from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 from rhythmid.value import Prior
 
 NO_ORIGIN = "No position was measured, so that its origin is arbitrary: the spring's rest length is kept as it was given."
-EVEN = 1e-3  # of the period; spread of the times between samples that still counts as even
-SETTLED = 0.1  # error, as a share of the motion, up to which a fit is not begun again from short windows
-# [s] at which another minimum is sought: from a few samples to a slow network
+EVEN = 1e-3  # of the period; spread of the sampling intervals up to which the samples count as even
+SETTLED = 0.1  # error, as a share of the motion, up to which a fit is not restarted from short windows
+# [s] delays from which another minimum is sought: from a few samples to a slow network
 FAR_DELAYS = (0.03, 0.08, 0.15, 0.25)
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """The refitted nominal model, its series, and what was noticed.
+    """The refitted nominal model, its series, and notes for the user.
 
-    The input of the series is as it turned out to be: held, or `reconstructed` between its samples.
+    The input of the series is held, or `reconstructed` between its samples where it turned out not to be held.
     """
 
     fit: Fit
@@ -48,11 +48,11 @@ class Calibration:
 
 
 def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) -> Model:
-    """The model with the delay of the input, if it has none, as a nuisance: known to a sample, two at most.
+    """Give the model an input delay; one that it does not have itself is added as a nuisance parameter.
 
-    A longer delay is a hypothesis of its own, or else it would take up friction and lags; a model that has a delay may take
-    any. Either may come out negative by up to a sample and a half: that is how an input that is not held, but simulated as
-    held, shows.
+    The prior of the nuisance has a standard deviation of one sample; its upper bound is `LATEST` samples. A longer delay is
+    a hypothesis of its own, because it would otherwise absorb friction and lags. A model's own delay keeps its upper bound.
+    Both may become negative by up to `EARLIEST` samples: this reveals an input that is simulated as held but is not held.
     """
     own = model.term("input_delay") is not None
     if not any(one.commanded or (own and one.command is not None) for one in series):
@@ -71,7 +71,7 @@ def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) ->
 
 
 def causal(model: Model) -> Model:
-    """The model with a delay that came out a little negative set to zero: no machine answers before it is asked."""
+    """The model with a slightly negative delay set to zero: a causal machine does not respond before the command."""
     current = model.parameters.get(INPUT_DELAY)
     if current is None or current.bounds[0] >= 0.0:
         return model
@@ -81,7 +81,7 @@ def causal(model: Model) -> Model:
 
 
 def _shooting_start(model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Model:
-    """Parameters from short windows with starts of their own: wrong values cannot drift far in a window."""
+    """Start values from short windows with initial states of their own, in which wrong values cannot drift far."""
     length = 2.0 / max(dominant_frequency(one) for one in series)
     windows = [part for one in series for part in split(one, length)]
     chosen = windows[:: max(1, len(windows) // 60)]
@@ -89,7 +89,7 @@ def _shooting_start(model: Model, series: Sequence[Series], pool: ThreadPoolExec
 
 
 def check_free(model: Model) -> None:
-    """Raise InputError for a model of which nothing is estimated."""
+    """Raise InputError for a model that has no free parameter."""
     if not model.free:
         raise InputError(
             "every parameter of the nominal model is fixed, so a wrong value could not be distinguished from missing physics; "
@@ -104,7 +104,7 @@ def calibrate(
     pool: ThreadPoolExecutor | None = None,
     tell: Tell = lambda _: None,
 ) -> Calibration:
-    """Refit the nominal model. Raises InputError when it has nothing to fit, or diverges whatever is tried."""
+    """Refit the nominal model. Raises InputError where nothing is free, or where it diverges from every start."""
     check_free(model)
     model = with_delays(model, series, catalogue)
     notes: tuple[str, ...] = ()
@@ -152,7 +152,7 @@ def _no_mass(model: Model) -> str:
 
 
 def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Fit:
-    """Try delays that are far from the start: a delay beyond half a period of the motion is another local minimum."""
+    """Try delays far from the start: a delay beyond half a period of the motion is another local minimum."""
     names = [name for name in (INPUT_DELAY, MEASUREMENT_DELAY) if name in fit.names]
     best = fit
     for name in names:
@@ -173,8 +173,10 @@ def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | 
 
 
 def reconstructed(series: Series) -> Series:
-    """The series with a held input reconstructed from its samples: band-limited where they are evenly spaced, else by
-    straight lines. One that is not held stays as it is."""
+    """The series with a held input reconstructed between its samples.
+
+    Evenly spaced samples are interpolated with a band-limited signal, others linearly. An input that is not held is kept.
+    """
     command = series.command
     if command is None or not is_held(command) or len(command.x) < 10:
         return series
@@ -182,17 +184,17 @@ def reconstructed(series: Series) -> Series:
     even = np.ptp(np.diff(time)) < EVEN * float(np.median(np.diff(time)))
     if not even:
         return replace(series, command=first_order_hold(time, value))
-    # averages hold nothing near the Nyquist frequency, where the samples alone would be too few
+    # block averages have no content near the Nyquist frequency; without averaging the samples alone would be too coarse
     finer = 1 if series.block > 1 else OVERSAMPLING
     return replace(series, command=band_limited(time, value, finer))
 
 
 def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, tell: Tell) -> Calibration:
-    """Notice an input that acts earlier than its samples: it was not held, and is reconstructed.
+    """Detect an input that acts earlier than its samples, hence was not held, and reconstruct it.
 
-    No machine answers before it is asked, so a delay that comes out negative speaks against holding; which of the two
-    predicts the next sample better decides, as far as a model can that may lack something. Holding delays by half a sample of the
-    command, so that one of many samples has another cause.
+    The machine is causal, so a negative delay contradicts holding. The one-step prediction error decides between the two,
+    as far as an incomplete model allows. Holding delays a command by half a sample on average; a shift of many samples
+    has another cause.
     """
     kept = Calibration(fit, tuple(series), ())
     held = [one for one in series if one.command is not None and is_held(one.command)]

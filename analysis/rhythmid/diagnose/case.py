@@ -1,4 +1,4 @@
-"""A case: what a diagnosis is asked, and what all of its parts need."""
+"""A case: the question that a diagnosis is asked, and what all of its parts need."""
 
 import math
 import time
@@ -11,31 +11,32 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 
-# shares of a budget up to which the catalogue is searched, hypotheses and other kinds of explanation are weighed, and what is not needed for
-# a verdict is computed. What is under way then ends with what it has, and what has to be done takes the rest (measured where processors
-# are shared with three times as much other work: from the end of the search to the answer a third of the whole)
+# Shares of the budget by which three parts end: the search of the catalogue; the weighing of hypotheses and other kinds
+# of explanation; everything that a verdict does not need. A part in progress then returns what it has. The rest of the
+# budget is for the mandatory steps (measured with three times as much other work on the processors: the time from the
+# end of the search to the answer is a third of the whole).
 SEARCHED, WEIGHED, EXPLAINED = 0.6, 0.8, 0.9
-LEAST_CALIBRATION = 10.0  # s in which the nominal model may be refitted, however small a budget is: without that nothing can be said
+LEAST_CALIBRATION = 10.0  # [s] allowed for refitting the nominal model, whatever the budget: without this fit no statement is possible
 
 
 @dataclass(frozen=True)
 class Budget:
-    """Seconds on the wall clock, from when the budget was made, in which an answer is due; None for as long as it needs."""
+    """Wall-clock time [s] for the answer, counted from the creation of the budget; None for no limit."""
 
     seconds: float | None = None
     began: float = field(default_factory=time.monotonic)
 
     def at(self, share: float, least: float = 0.0) -> float:
-        """When so large a share of it will have passed, but `least` [s] at least; infinite without any seconds."""
+        """The time at which this share of the budget will have passed, at least `least` [s] from its start; infinite without a limit."""
         return math.inf if self.seconds is None else self.began + max(share * self.seconds, least)
 
     def passed(self, share: float) -> bool:
-        """Whether so large a share of it has passed."""
+        """Whether this share of the budget has passed."""
         return time.monotonic() > self.at(share)
 
     @property
     def spent(self) -> bool:
-        """Whether the search is to begin nothing more."""
+        """Whether the search must not begin anything new."""
         return self.passed(SEARCHED)
 
 
@@ -46,10 +47,10 @@ class Case:
     Parameters
     ----------
     nominal : the model as given.
-    records, holdout : as given to the diagnosis, made tidy; without `holdout` the last fifth of each record is held out.
+    records, holdout : cleaned records of the diagnosis; without `holdout` the last fifth of each record is held out.
     catalogue : elements that may be missing.
     pool : threads that simulate.
-    tell : is told what begins.
+    tell : called with a sentence at the beginning of each step.
     budget : time for the answer.
     """
 

@@ -1,134 +1,138 @@
-"""The constants that decide what is believed: evidence, rejections, verdict, and the choice between answers.
+"""The constants that decide which hypotheses are believed: evidence, rejections, verdict, choice between answers.
 
-Each has its reason and, where there is one, its source. Numbers that stay beside their method, in this folder and below it, do
-not decide what is believed of a hypothesis: they say how hypotheses are sought (which are fitted, from where, for how long),
-how intervals are computed, and what is shown.
+Each has a reason and, where there is one, a source. Constants that stay beside their method, in this folder and below,
+do not decide which hypothesis is believed. They control how hypotheses are sought (which are fitted, from which start, for
+how long), how intervals are computed, and what is shown.
 """
 
 # --- how predictions are scored -------------------------------------------------------------------------------------
-# contiguous blocks of all records together: so many that the standard error of a gain is small although an effect acts in a
-# tenth of them only (a stop, a large chirp), and
+# contiguous blocks of all records together: enough for a small standard error of a gain even where an effect acts in a
+# tenth of them only (a stop, a large chirp)
 BLOCKS = 144
-# rows of a block at least, so that each is longer than the noise remembers
+# minimum rows of a block: each block is longer than the correlation time of the noise
 # (J. Shao, J. Am. Stat. Assoc. 88 (1993) 486: cross-validation has to leave out much)
 ROWS_OF_A_BLOCK = 12
-# folds, into which the blocks are dealt in turn, so that every fold sees every amplitude (S. Geisser, Biometrika 62 (1975) 320)
+# folds, to which the blocks are assigned in turn, so that each fold covers all amplitudes (S. Geisser, Biometrika 62 (1975) 320)
 FOLDS = 6
-# blocks of each record at least, so that none is left out as a whole or decides alone
+# minimum blocks of each record, so that no record is left out as a whole or decides alone
 BLOCKS_OF_A_RECORD = 3
-# passes of reweighted least squares in each fold: from the fit of all folds one moves the weights, two settle them
+# passes of reweighted least squares in each fold, starting from the fit of all folds: the first changes the weights, two more converge
 REWEIGHTED = 3
-# draws of the Bayesian bootstrap: probabilities to about 0.01 (Y. Yao et al., Bayesian Analysis 13 (2018) 917)
+# draws of the Bayesian bootstrap: resolve probabilities to about 0.01 (Y. Yao et al., Bayesian Analysis 13 (2018) 917)
 DRAWS = 2000
-# logarithm of the prior odds that each further effect costs: one in e (as Y. Yao et al. weigh models of unequal size)
+# cost of each further effect, in logarithm of prior odds: odds of 1/e (Y. Yao et al. weigh models of unequal size in this way)
 EFFECT_PRIOR = 1.0
 
-# --- what an effect has to bring ------------------------------------------------------------------------------------
+# --- what an effect has to contribute -------------------------------------------------------------------------------
 # false-alarm rate of a further effect, over all candidates (C. E. Bonferroni)
 FALSE_ALARM = 0.025
-# odds that one block of data brings at most for an effect: strong evidence (R. E. Kass, A. E. Raftery, J. Am. Stat. Assoc. 90
-# (1995) 773). An effect may act in few blocks, such as a limit that is met in fast moves; it is not believed for one of them
+# upper limit of the odds that one block can contribute for an effect: strong evidence (R. E. Kass, A. E. Raftery, J. Am. Stat.
+# Assoc. 90 (1995) 773). An effect may act in few blocks, such as a limit reached in fast moves; one block is not enough
 BLOCK_ODDS = 20.0
-# share of what can still be explained that a further effect has to remove: less is a part of something else
-# (real recordings: an axis, six arm joints, a frame, pendulums; shares of right effects were 0.3 and more)
+# share of the still explainable mismatch that a further effect has to remove: an effect that removes less is part of another
+# one (real recordings: an axis, six arm joints, a frame, pendulums; correct effects had shares of 0.3 and more)
 REST = 0.2
-# share of the whole mismatch that a further effect has to remove: a tenth of the motion that the first one changes.
-# It keeps the effects of pairs, of which one may be thirty times the other in size
+# share of the whole mismatch that a further effect has to remove: a tenth of the motion that the first effect changes.
+# It keeps both effects of a pair of which one is up to thirty times as large as the other
 MISMATCH = 1e-3
-# the same for a richer law in the place of one that it contains. A richer law takes up small effects that the model lacks, each 0.5 to 10 % of
-# the main one, so up to a hundredth of its mean square (sealed cases: what laws that are richer than the true one remove is 0.0125 and less,
-# what true ones do beyond a simpler one 0.033 and more)
+# the same for a richer law that replaces one that it contains. A richer law absorbs small effects that the model lacks. Each
+# is 0.5 to 10 % of the main one, hence up to a hundredth of its mean square (sealed cases: laws richer than the true one
+# remove at most 0.0125, true laws remove at least 0.033 beyond a simpler one)
 RICHER = 0.02
-# size of no practical matter, as a share of the motion (free run) or of the effort: a tenth of what real machines leave,
-# whose models end at 2 to 5 % (measured: axis 2.1, arm joints 1.5 to 4.8, pendulums 0.5 to 0.75 %)
+# size below which an effect has no practical importance, as a share of the motion (free run): a tenth of the error that models
+# of real machines leave, 2 to 5 % (measured: axis 2.1, arm joints 1.5 to 4.8, pendulums 0.5 to 0.75 %)
 PRACTICAL = 0.003
-# and of the effort, of which what a machine leaves is a larger share
+# the same as a share of the effort, of which models of real machines leave a larger share
 PRACTICAL_EFFORT = 0.005
-# standard errors within which a simpler or related law predicts as well (A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413)
+# standard errors within which a simpler or related law counts as predicting equally well
+# (A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413)
 EQUIVALENT = 2.0
 
-# of a bound, or of an effect, within which a value is taken to be there: rounding of a descent that stopped at it
+# share of a bound, or of an effect, within which a value counts as being there: rounding of a descent that stopped at it
 EDGE = 1e-3
-# resolved lines between an effect's frequency and a multiple of the forcing's, or that of a free motion: closer than the width of a line they are one
+# frequency resolutions within which an effect's frequency counts as equal to a multiple of the forcing's, or to that of a free
+# motion: spectral lines closer than their width cannot be separated
 OWN_LINE = 1.0
-# share of what an effect that changes with time does beyond the nominal model that no free map of the motion does: friction by direction
-# taken for a fading actuator has 0.004 and less where the motion is made once, and any effect 0.13 and more where it comes again
+# for an effect that changes with time: share of its action beyond the nominal model that no free map of the motion reproduces.
+# Friction by direction mistaken for a fading actuator has 0.004 and less where the motion is made once; any effect has 0.13 and
+# more where the motion is repeated
 RECURS = 0.05
-# share of the effort that an actuator's effect leaves to move the machine: one that takes more than half explains no motion
+# share of the effort that an actuator's effect must leave for moving the machine: an effect that takes more than half explains no motion
 MOVES = 0.5
 
 # --- what a verdict needs -------------------------------------------------------------------------------------------
-# joint probability of the names that an answer stands by
+# joint probability from which names are stated
 STATED = 0.8
-# share of what free maps and names together explain that the names have to, for an answer to stand by them
+# share of all that free maps and names together explain that the names must explain, for the names to be stated
 EXPLAINED = 0.8
-# the same, from which the names are the main part of it
+# the same share, from which the names explain the main part
 MAINLY = 0.5
-# chance that the catalogue holds the truth, as a function of what the names leave of all that anything explains: half at
-# `ADEQUATE`, falling with its power `STEEPNESS` (fitted to sealed cases whose truth was in the catalogue or not: docs/proof.md)
+# chance that the catalogue holds the truth, as a function of the unexplained share of the explainable mismatch: one half at
+# `ADEQUATE`, falling with the power `STEEPNESS` (fitted to sealed cases whose truth was in the catalogue or not: docs/proof.md)
 ADEQUATE = 0.18
 STEEPNESS = 1.5
-# chance that the catalogue holds the truth where the names explain all, their sizes are known and no other name predicts as well
-# (fitted to sealed cases, a quarter of whose laws the catalogue lacked: docs/proof.md)
+# chance that the catalogue holds the truth where the names explain everything, their sizes are known and no other name predicts
+# as well (fitted to sealed cases, a quarter of whose laws the catalogue lacked: docs/proof.md)
 HOLDS = 0.95
-# chance that an effect whose size is open is that law and not only one of its limits, which a law that the catalogue lacks has as well
-# (fitted to the same cases); and the standard deviation of a size, relative to the size, half-way to which it is open, with the power by
-# which it gets so. Play that never closes is a gain, and a spring whose kink is out of reach a constant force. Of sealed names whose size had a
-# deviation above 0.2 only 5 in 22 were right, and the family of 10
+# OPEN: chance that an effect of undetermined size is the named law, and not only one of its limits, which a law outside the
+# catalogue may share (fitted to the same cases). VAGUE: relative standard deviation of the size half-way to this chance;
+# VAGUENESS: the power of the transition. Examples: play that never closes is a gain; a spring whose kink is out of reach is a
+# constant force. Of 22 sealed names with a deviation above 0.2 only 5 were right, and the family of 10
 OPEN = 0.3
 VAGUE = 0.2
 VAGUENESS = 3.0
-# prior odds of a family on real machines, over those with which the proof draws it. The proof draws all effects alike, real machines have
-# friction. Of names that first runs stated on recordings of real machines (docs/real.md) 26 of 28 of friction were accepted, and 5 of 29 of other
-# families: a ratio of the odds of 60. Some of the errors had causes that were corrected since, so that its square root is taken, to either side of one
+# prior odds of a family on real machines, relative to the proof, which draws all effects equally often. Real machines have
+# friction. First runs stated names on recordings of real machines (docs/real.md): 26 of 28 names of friction and 5 of
+# 29 names of other families were accepted, a ratio of the odds of 60. Some causes of errors have been corrected since; so the
+# square root of the ratio is taken, and split evenly above and below one
 PRIOR_ODDS = {"friction": 3.0}
 PRIOR_ODDS_OF_OTHERS = 0.3
-# share of what was measured that a model may miss in a way which follows from its own past, for an answer to say anything of it: a model that
-# misses more than half describes another machine
+# share of the measurement that a model may miss in a predictable way (from the residual's own past) for an answer to be given:
+# a model that misses more than half describes another machine
 MISSES_MOST = 0.5
-# effect that the records would not show, as a share of what was measured, from which they decide nothing: as large as what
-# the refitted model of a machine may leave and still be called identified
+# smallest detectable effect, as a share of the measurement, from which the records decide nothing: as large as the error that
+# the refitted model of a machine may leave and still count as identified
 BLIND = 0.2
-# standard deviations of the mean square of noise, above which an effect would show in it: by chance once in 30 000 records
+# standard deviations of the mean square of noise above which an effect is detectable: by chance once in 30 000 records
 SHOWS = 4.0
 
 # --- how records are scored -----------------------------------------------------------------------------------------
-# of the effort, up to which models of real machines leave it and no other way to score is tried (measured: 2 to 5 %, see `PRACTICAL`)
+# share of the effort that models of real machines leave; up to it no other scoring mode is tried (measured: 2 to 5 %, see `PRACTICAL`)
 LEFT = 0.05
-# effort, as a share of the inertial force, from which it is scored before windows are: it moves the machine against other forces.
-# Where it is smaller the machine swings by itself, and the effort shows little of what else acts
+# ratio of effort to inertial force from which effort is scored before windows: the effort moves the machine against other
+# forces. With a smaller effort the machine swings by itself, and the effort shows little of the other forces
 DRIVES_IT = 1.0
-# the same share, from which it is scored before a free run is: the motion is what is left of large forces that cancel, an error of the effort
-# moves the machine far, and the effort itself says what it works against (inertia below a tenth of it)
+# the same ratio, from which effort is scored before a free run. The motion is then a small difference of large forces, so that a
+# small error of the effort moves the machine far; the effort itself shows the forces it works against (inertia is below a tenth)
 QUASI_STATIC = 10.0
-# error, as a share of the motion, below which a model follows the machine: a run that is lost altogether is wrong by 1 or more,
-# and the effects of the proof at full size leave less than this
+# error, as a share of the motion, below which a model follows the machine: a run that has lost the machine has an error of 1 or
+# more, and the effects of the proof at full size leave less than this
 FOLLOWS = 0.3
-# error of a free run, the same share, along which a score says nothing: hardly less than that of no motion at all
+# the same error of a free run, from which its score carries no information: hardly less than the error of predicting no motion
 HOPELESS = 0.8
-# share to which a step to shorter windows has to lower the error, and steps without such a gain before no more are tried: windows
-# half as long have twice as many free starts, which lower it by less
+# ratio to which a step to shorter windows must lower the error, and the number of steps without such a gain after which the
+# search stops. Windows half as long have twice as many free initial states, which alone lower the error by less
 BETTER_STEP, PATIENCE = 0.9, 2
-# share to which all steps together have to: an error that adds up, not one made at once by noise or an effect
+# ratio to which all steps together must lower it: this shows an error that accumulates, not one that noise or an effect makes at once
 BETTER_TOGETHER = 0.6
 
-# --- what calibration may take up -----------------------------------------------------------------------------------
-# samples by which the input's delay may come out short of none, as one that is reconstructed otherwise than by holding does (by
-# half of one), and up to which it is a nuisance that every log may have; a longer delay is a hypothesis of its own
+# --- what calibration may absorb ------------------------------------------------------------------------------------
+# [samples] how far the input delay may be negative, and the longest delay that counts as a nuisance. An input that is not held but
+# simulated as held comes out half a sample early. Every log may have a short delay; a longer one is a hypothesis of its own
 EARLIEST, LATEST = 1.5, 2.5
-# share to which a delay far from its start has to lower the error, or it but stands in for what is missing
+# ratio to which a delay far from its start must lower the error; otherwise it is only a surrogate for missing physics
 STANDS_IN = 0.7
-# standard deviations, and a share of a sample, by which a delay has to come out negative for the input not to have been held
+# a negative delay shows an input that was not held if it exceeds this many standard deviations and this share of a sample
 NOT_HELD, NOT_HELD_LEAST = 4.0, 0.05
-# standard deviations, and a share of the value, by which the records have to differ from a nominal value to contradict it
+# the records contradict a nominal value if they differ by this many standard deviations and this share of the value
 CONTRADICTS, CONTRADICTS_LEAST = 4.0, 0.02
 
 # --- which other explanations compete -------------------------------------------------------------------------------
-# laws of one quantity that are more likely a series for one law than causes of their own; two of them real springs have
+# number of laws of one quantity from which they more likely approximate one law than act separately; real springs have two
 SERIES = 3
-# periods of the motion that a delay of the input may be: half a turn looks like another sign, so that a longer one is another
-# minimum of the same
+# periods of the motion up to which an input delay is sought: a delay of half a period looks like a change of sign, so that a longer
+# one is another minimum of the same fit
 LONGEST_DELAY = 0.25
-# times the ranges of the motion within which an effect has to be curved: no part of the motion exceeds them, nor what a limit
-# has cut off; and those where every kink shows
+# times the range of the motion. REACH: the effect must be curved within it (the motion and a signal before clipping stay within
+# it). FAR_RANGES: every kink shows within it
 REACH, FAR_RANGES = 1.2, 1e3

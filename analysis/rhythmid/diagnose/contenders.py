@@ -1,7 +1,7 @@
-"""Contenders: the models that the search has fitted in free run, each made a hypothesis with its predictions.
+"""Contenders: the models that the search has fitted in free run, as hypotheses with their predictions.
 
-All are scored on the same rows: the whitened residuals of what the fit saw, predicted by cross-validation, and of what it did
-not see, the hidden ends of the same records or separate ones.
+All are scored on the same rows of whitened residuals. Rows that the fit saw are predicted by cross-validation. Rows that
+it did not see are the hidden ends of the same records, or separate records.
 """
 
 import math
@@ -43,14 +43,14 @@ class Rows:
     Parameters
     ----------
     seen : stretches of each series that the fit sees, in order.
-    hidden : stretches of each series that are hidden from it.
+    hidden : stretches of each series that are hidden from the fit.
     unseen : separate series that no fit sees.
-    noise : noise model under which residuals are whitened.
+    noise : noise model by which residuals are whitened.
     record : (n,) record of each row: the seen rows first, then the hidden ones, then those of separate series.
     spread : (n,) relative standard deviation of the noise of each row, see `Series`.
     blocks : blocks of the rows.
-    size : rms of what errors are a share of, over all rows.
-    heldout_size : the same over the rows that no fit sees; 0 without any.
+    size : rms over all rows of the signal that errors are a share of.
+    heldout_size : the same over the rows that no fit sees; 0 where there are none.
     """
 
     seen: tuple[tuple[slice, ...], ...]
@@ -80,7 +80,7 @@ class Rows:
 
 
 def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseModel) -> Rows:
-    """The rows of these series and of separate held-out ones, under a noise model."""
+    """The rows of the fitted and of separate held-out series under a noise model."""
     seen = tuple(one.stretches(noise) for one in series)
     hidden = tuple(one.stretches(noise, hidden=True) for one in series)
     others = tuple(one.stretches(noise) for one in unseen)
@@ -121,13 +121,15 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
 
 
 def _rounding(series: Sequence[Series], noise: NoiseModel) -> float:
-    """Standard deviation of the error of rounding, in units of the innovations of the noise."""
+    """Standard deviation of the rounding error, in units of the innovations of the noise."""
     return max(one.resolution for one in series) / math.sqrt(12.0) / noise.std
 
 
 def linearised(fit: Fit, rows: Rows) -> Linearised:
-    """A fit on the rows: what it leaves of each, and how what it saw depends on its parameters; what ends at a bound is taken for fixed
-    there."""
+    """Residual and sensitivities of a fit on all rows.
+
+    Only rows that the fit saw have sensitivities. A parameter at a bound counts as fixed there.
+    """
     unseen = [_of_unseen(fit, rows)] if rows.unseen else []
     hidden = [
         one.whitened(rows.noise, residual, parts)
@@ -147,14 +149,16 @@ def linearised(fit: Fit, rows: Rows) -> Linearised:
 
 
 def _at_bound(fit: Fit) -> NDArray[np.bool_]:
-    """Parameters (p,) that end at a bound: without a part of the rows they would not go beyond it either."""
+    """Parameters (p,) that end at a bound; they would stay there if a part of the rows were left out."""
     bounds = [fit.model.parameters[name].bounds for name in fit.names]
     return np.array([not low < value < high for value, (low, high) in zip(fit.values, bounds)], dtype=bool)
 
 
 def _of_unseen(fit: Fit, rows: Rows) -> Array:
-    """What a fit leaves of separate held-out records, only their initial states estimated; of a model that diverges there, which
-    predicts nothing, the motion itself."""
+    """Residual on separate held-out records, with only their initial states estimated.
+
+    For a model that diverges there, and so predicts nothing, the motion itself.
+    """
     again = rerun(fit.model, rows.unseen, rows.noise, fit.run.max_step)
     if again is not None:
         return again.linearisation.residual
@@ -165,7 +169,7 @@ def _of_unseen(fit: Fit, rows: Rows) -> Array:
 
 @dataclass(frozen=True)
 class Contender:
-    """A fitted model with the errors of its predictions, in units of the noise and in the measurement's, and its free parameters."""
+    """A fitted model with its prediction errors, whitened and in the measurement's unit, and its free parameters."""
 
     trial: Trial
     kind: Kind
@@ -175,7 +179,7 @@ class Contender:
 
 
 def measured_errors(error: Array, rows: Rows) -> Array:
-    """Errors (n,) in the measurement's unit from whitened ones (n,), stretch by stretch."""
+    """Convert whitened errors (n,) to errors (n,) in the measurement's unit, stretch by stretch."""
     made, first = [], 0
     lengths = [s.stop - s.start for parts in (*rows.seen, *rows.hidden) for s in parts]
     lengths.append(len(error) - sum(lengths))
@@ -193,11 +197,12 @@ def contend(
     reach: float = math.inf,
     tell: Tell = silent,
 ) -> list[Contender]:
-    """Contenders of these trials, in their order; those that diverge are left out, and once time is up all that are not needed.
+    """Contenders of these trials, in their order.
 
-    Chi2 of those that matter comes to `reach`; what does not is weighed as far as it has come. The nominal model is a measure for
-    all and always fitted whole, and so is the best model of each number of effects: what richer ones explain beside it decides. These are
-    needed, whatever the time.
+    Trials that diverge are left out; after the deadline, so are all that are not needed. A trial whose chi2 would not come
+    to `reach` is weighed without being fitted to convergence. Two kinds are needed and always fitted completely: the
+    nominal model, with which all are compared, and the best model of each number of effects, because richer models are judged
+    by what they explain beyond it.
     """
     whole = {min(group, key=lambda one: one.chi2).added for group in _by_size(trials).values()}
 
@@ -214,7 +219,7 @@ def contend(
         free = start_freedom(
             felt_starts(fit.model, fit.run, rows.noise, fit.starts, fit.residuals, state_steps)
         )
-        if free > 0.0:  # spread over what the fit saw
+        if free > 0.0:  # distributed over the rows that the fit saw
             found = replace(found, penalty=free / max(rows.fitted, 1))
         values = dict(zip(fit.names, fit.values.tolist(), strict=True))
         return found, measured_errors(found.error, rows), values
@@ -225,15 +230,17 @@ def contend(
 
 
 def check_determined(fit: Fit, name: str) -> None:
-    """Raise InputError where the records do not determine a value that was set free: what the fit gains then is the other parameters', which
-    may go anywhere along with it."""
+    """Raise InputError where the records do not determine a freed value.
+
+    The gain of such a fit is due to other parameters, which may then change without limit together with it.
+    """
     value, std = fit.model.value(name), fit.std.get(name, math.inf)
     if not std < abs(value):
         raise InputError(f"the records do not determine {name} beside the other parameters")
 
 
 def _by_size(trials: Sequence[tuple[Trial, Kind]]) -> dict[int, list[Trial]]:
-    """The models of effects, by the number of these."""
+    """The models of kind "effects", grouped by their number of effects."""
     found: dict[int, list[Trial]] = {}
     for trial, kind in trials:
         if kind == "effects":
@@ -242,7 +249,7 @@ def _by_size(trials: Sequence[tuple[Trial, Kind]]) -> dict[int, list[Trial]]:
 
 
 def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> list[Hypothesis]:
-    """The contenders as hypotheses, under the autocorrelation time of the one that predicts best."""
+    """Convert the contenders to hypotheses, using the autocorrelation time of the one that predicts best."""
     time = remembered(contenders, rows)
     return [
         Hypothesis.of(
@@ -260,12 +267,12 @@ def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> 
 
 
 def remembered(contenders: Sequence[Contender], rows: Rows) -> float:
-    """Autocorrelation time in rows of the errors of the contender that predicts best."""
+    """Autocorrelation time [rows] of the errors of the contender that predicts best."""
     return time_of_best([one.found for one in contenders], rows.record)
 
 
 def heldout_error(error: Array, rows: Rows) -> float | None:
-    """Rms of the errors (n,) on held-out rows, as a share of what errors are a share of; None where nothing is held out."""
+    """Relative rms of the errors (n,) on held-out rows; None where nothing is held out."""
     held = rows.heldout
     if not held.any() or rows.heldout_size == 0.0:
         return None

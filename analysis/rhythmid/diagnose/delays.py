@@ -1,4 +1,4 @@
-"""The two delays of a fit, their sum, and whether the records can tell them apart."""
+"""The two delays of a fit and their sum, and whether the records separate them."""
 
 import math
 from typing import Any
@@ -12,7 +12,7 @@ NAMES = {"input": INPUT_DELAY, "measurement": MEASUREMENT_DELAY}
 
 
 def delays_of(fit: Fit) -> dict[str, Any]:
-    """Delays with standard deviations [s] by the contract of the JSON output."""
+    """Delays with standard deviations [s], in the format of the JSON output."""
     found: dict[str, Any] = {}
     places = {}
     for key, name in NAMES.items():
@@ -26,7 +26,7 @@ def delays_of(fit: Fit) -> dict[str, Any]:
             found[key] = {}
     if found["input"] and found["measurement"]:
         chosen = list(places.values())
-        with np.errstate(invalid="ignore"):  # infinite less infinite: undetermined
+        with np.errstate(invalid="ignore"):  # infinity minus infinity: undetermined
             variance = float(fit.covariance[np.ix_(chosen, chosen)].sum())
         total = found["input"]["value"] + found["measurement"]["value"]
         scatter = math.sqrt(max(variance, 0.0)) if math.isfinite(variance) else None

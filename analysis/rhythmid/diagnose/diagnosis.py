@@ -1,8 +1,7 @@
 """Diagnose: detect, locate, name, model, show.
 
-From records and a nominal model to a verdict: the records are admitted, the way to score them is chosen, the catalogue is
-searched for what the nominal model lacks, the hypotheses are weighed on data that no fit has seen, and the answer says how sure
-it is.
+From records and a nominal model to a verdict: select the records, choose how to score them, search the catalogue for what
+the nominal model lacks, weigh the hypotheses on data that no fit has seen, and report how certain the answer is.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -59,16 +58,16 @@ DOUBTED = "Believe neither without another experiment."
 
 @dataclass(frozen=True)
 class Answer(Result):
-    """A diagnosis, the augmented model, and all that is behind them.
+    """A diagnosis, the augmented model, and everything they are based on.
 
     Attributes
     ----------
     diagnosis
         Verdict, names, sizes, hypotheses and rejections: the content of `diagnose --json`.
     model
-        The nominal model with what it lacked, refitted.
+        The nominal model with the missing effects added, refitted.
     result
-        Everything behind the decision.
+        All data on which the decision is based.
 
     Examples
     --------
@@ -81,12 +80,12 @@ class Answer(Result):
 
     @property
     def block(self) -> int:
-        """Samples that were averaged before they were compared."""
+        """Number of samples averaged before the comparison."""
         return self.result.calibration.series[0].block if isinstance(self.result, FreeRunResult) else 1
 
     @property
     def stands(self) -> bool:
-        """Whether it stands by names."""
+        """Whether the answer states names."""
         return self.diagnosis.verdict == "missing_physics"
 
     @property
@@ -96,9 +95,9 @@ class Answer(Result):
 
     @property
     def covariance(self) -> JointCovariance:
-        """Covariance of the chosen model's parameters, with what the choice of the model adds.
+        """Covariance of the chosen model's parameters, including the uncertainty of the choice of the model.
 
-        Raises InputError where effort was scored: its standard deviations are those of each parameter alone.
+        Raises InputError for effort scoring, whose standard deviations have no covariances.
         """
         if not isinstance(self.result, FreeRunResult):
             raise InputError("parameters that were fitted to the recorded effort have no joint covariance")
@@ -130,7 +129,7 @@ class Answer(Result):
         }
 
     def show(self, console: "Console") -> None:
-        """Print the verdict, names, hypotheses, what is left, and what is not believed."""
+        """Print the verdict, names, hypotheses, the remainder and the rejected hypotheses."""
         from rhythmid.diagnose.answer.printed import show
 
         show(self.diagnosis, console)
@@ -141,9 +140,9 @@ class Answer(Result):
         Parameters
         ----------
         axis
-            Matplotlib axis; one of a new figure where None.
+            Matplotlib axis; a new figure where None.
         most
-            Hypotheses that are drawn.
+            Largest number of hypotheses to draw.
         """
         from rhythmid.diagnose.answer.figure import draw_hypotheses
 
@@ -152,7 +151,7 @@ class Answer(Result):
         return axis
 
     def ledger(self) -> dict[str, Any]:
-        """All that the decision depends on, as plain data; see `replay`."""
+        """All data that the decision depends on, as plain data; see `replay`."""
         return ledger(self.result.contest, self.result.detectable, self.result.size_errors)
 
 
@@ -169,22 +168,22 @@ def diagnose(
     Parameters
     ----------
     records
-        One or more, to which the models are fitted.
+        One or more records, to which the models are fitted.
     model
         The nominal model.
     holdout
-        Records to judge by only; without any, the last fifth of every record is held out.
+        Records used for judging only; without any, the last fifth of every record is held out.
     catalogue
         Elements that may be missing; the built-in ones by default.
     tell
         Called with a sentence at the beginning of each step.
     budget
-        Seconds on the wall clock in which an answer is due; the answer says what was not tried for want of time.
+        Wall-clock time [s] in which an answer is due; the answer lists what was not tried for lack of time.
 
     Returns
     -------
     Answer
-        The same whenever the records are, but for a budget that ends the search. A machine of several joints gives a `MachineAnswer`.
+        Deterministic for the same records, unless a budget ends the search. A machine of several joints gives a `MachineAnswer`.
 
     Raises
     ------
@@ -205,7 +204,7 @@ def diagnose(
     if not fitted:
         raise InputError("no record is given; name at least one bag or table")
     if not isinstance(model, Model):
-        from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine  # it needs MuJoCo
+        from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine  # needs MuJoCo
 
         first, second = (cast("tuple[JointRecord, ...]", one) for one in (fitted, judged))
         return cast(Answer, diagnose_machine(first, model, second, catalogue, tell, budget))
@@ -218,7 +217,7 @@ def diagnose(
     model = with_declared(model, (*records, *holdout))
     check_free(model)
     given = admitted(records, holdout, model)
-    # the matrices are tall and thin, and workers run side by side: threads inside linear algebra only get in the way
+    # the matrices are tall and thin and workers run in parallel: threads inside linear algebra would only slow them down
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         known = catalogue or load_catalogue()
         case = Case(model, given.records, given.holdout, known, pool, tell, Budget(budget))
@@ -234,7 +233,7 @@ def diagnose(
             except InputError as error:
                 if not made:
                     raise _refused(error, effort) from error
-                # another way to score could not follow the machine
+                # the machine could not be followed in this further scoring mode
                 untried.append(Untried(ANOTHER, str(error)))
                 break
             if answer is None:
@@ -252,8 +251,11 @@ def diagnose(
 
 
 def _chosen(made: Sequence[Answer]) -> Answer:
-    """The first answer that stands by names; without one, the first that is no effort in which nothing is missing: an effort does not show
-    what acts beside rests, or in the command's path, and the motion that was scored after it may."""
+    """The first answer that states names.
+
+    Without one, the first answer that is not a "consistent" one from effort scoring. Effort does not show effects during
+    rests or in the command path; the motion, scored afterwards, may.
+    """
     stands = (one for one in made if one.stands)
     found = ((one.diagnosis.scoring.kind, one.diagnosis.verdict) for one in made)
     telling = (one for one, said in zip(made, found, strict=True) if said != ("effort", "consistent"))
@@ -261,7 +263,7 @@ def _chosen(made: Sequence[Answer]) -> Answer:
 
 
 def _warning(case: Case, untried: list[Untried]) -> str | None:
-    """What `check_plausible` warns of. With the time for it over it is no judgement, and joins `untried`."""
+    """The warning of `check_plausible`, if any; if there was no time to finish the check, that is added to `untried`."""
     with deadline(case.budget.at(SEARCHED, LEAST_CALIBRATION)):
         try:
             warned = check_plausible(case.nominal, case.records, case.pool)
@@ -276,7 +278,7 @@ def _warning(case: Case, untried: list[Untried]) -> str | None:
 
 
 def _refused(error: InputError, effort: Applicability) -> InputError:
-    """Why no way to score could be gone: what the motion lacks, and what the recorded effort does."""
+    """Error for records that no scoring mode suits: the reasons for the motion and for the effort."""
     if not effort.recorded:
         return error
     return InputError(f"{error}. The recorded effort cannot be scored either: {effort.reason}")
@@ -285,12 +287,12 @@ def _refused(error: InputError, effort: Applicability) -> InputError:
 def _answers(
     case: Case, whole: Case, effort: Applicability, given: Admitted, untried: list[Untried]
 ) -> Iterator[Answer]:
-    """Answers of all ways to score that apply, the most telling way first; they are worked out as they are asked for.
+    """Answers of all applicable scoring modes, the most informative first, computed on demand.
 
-    A free run that follows the machine comes first, unless the machine is quasi-static. Else the recorded effort does where it is at
-    least as large as the inertial force, so that it moves the machine against other forces, and windows where the machine swings by itself.
-    Effort is scored on the `whole` case, whose records nothing cuts. With an answer in hand no further way begins once the budget
-    is spent; what the next one would have been joins `untried`.
+    A free run that follows the machine comes first, unless the machine is quasi-static. Otherwise effort comes first where it
+    is at least as large as the inertial force, because it then moves the machine against other forces. Windows come first
+    where the machine swings by itself. Effort is scored on the `whole` case, whose records are not cut. After a first answer
+    no further mode begins once the budget is spent; the next mode is then added to `untried`.
     """
     effort_notes = (*given.whole_notes, *effort.notes)
     driven = effort.applies and effort.effort_share >= DRIVES_IT
@@ -346,7 +348,7 @@ def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: in
 
 
 def _compared(answer: Answer, made: Sequence[Answer]) -> Answer:
-    """The answer with a note for each other way to score, of those that were `made`, that comes to another verdict or other names."""
+    """The answer with a note for each answer in `made` by another scoring mode that has another verdict or other names."""
     found = answer.diagnosis
     notes = [_difference(found, other.diagnosis) for other in made if other is not answer]
     told = tuple(note for note in notes if note is not None)
@@ -354,8 +356,10 @@ def _compared(answer: Answer, made: Sequence[Answer]) -> Answer:
 
 
 def _difference(found: Diagnosis, other: Diagnosis) -> str | None:
-    """In a sentence, what another way to score the same records says against an answer; None where it agrees, or where it could not
-    show what the answer names."""
+    """One sentence: how the result of another scoring mode contradicts an answer.
+
+    None where they agree, or where the other mode could not show the named effects.
+    """
     scored = f"Scored {HOW[other.scoring.kind]} the same records"
     names, others = ({effect.element for effect in one.missing} for one in (found, other))
     if found.verdict == other.verdict:
@@ -370,7 +374,7 @@ def _difference(found: Diagnosis, other: Diagnosis) -> str | None:
 
 
 def _with_untried(answer: Answer, untried: Sequence[Untried]) -> Answer:
-    """The answer that says, too, which ways to score the budget left no time for, or the records could not be scored in."""
+    """The answer, extended by the scoring modes that were not tried for lack of time or because of the records."""
     if not untried:
         return answer
     found = answer.diagnosis
@@ -378,8 +382,11 @@ def _with_untried(answer: Answer, untried: Sequence[Untried]) -> Answer:
 
 
 def with_unit_warning(answer: Answer, nominal: Model, warned: str | None) -> Answer:
-    """The answer with the warning that a channel seems to be in another unit, unless the values are near the given ones once what is
-    missing is modelled: a wrong unit would still shift them."""
+    """The answer with a warning about a channel that seems to be in another unit.
+
+    No warning is given if the values are near the given ones once the missing effects are modelled: a wrong unit would
+    still shift them.
+    """
     if warned is None or shift(nominal, answer.model) < BACK:
         return answer
     first = answer.diagnosis

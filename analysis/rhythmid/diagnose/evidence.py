@@ -1,12 +1,13 @@
-"""Evidence: how well each hypothesis predicts data that its fit has not seen, and the probabilities that follow.
+"""Evidence: how well each hypothesis predicts data that its fit has not seen, and the resulting probabilities.
 
-Blocks of the records are left out in turn. The parameters that the other blocks give follow from the one fit of all of them by
-Gauss-Newton steps (approximate cross-validation: K. R. Rad, A. Maleki, J. R. Stat. Soc. B 82 (2020) 965; R. Giordano et al.,
-AISTATS 2019); where a hypothesis is linear in its parameters that is exact. Predictive densities are Student's t, with a scale
-that varies about that of the blocks which the fit saw (`varying_scale`), and are divided by the residual's integrated autocorrelation time, so that samples
-which repeat one another do not count twice. Hypotheses are compared by their differences in each block: the standard error of
-the sum says how much of it is the records' mood, and pseudo-BMA weights under the Bayesian bootstrap
-(Y. Yao, A. Vehtari, D. Simpson, A. Gelman, Bayesian Analysis 13 (2018) 917) turn them into probabilities.
+Blocks of the records are left out in turn. The parameters that the other blocks give are computed from the one fit of all
+blocks by Gauss-Newton steps (approximate cross-validation: K. R. Rad, A. Maleki, J. R. Stat. Soc. B 82 (2020) 965;
+R. Giordano et al., AISTATS 2019). For a hypothesis that is linear in its parameters this is exact. Predictive densities are
+Student's t, with a scale that varies about that of the blocks which the fit saw (`varying_scale`). They are divided by the
+residual's integrated autocorrelation time, so that correlated samples do not count twice. Hypotheses are compared by their
+differences in each block. The standard error of the sum shows how much of it depends on the choice of records. Pseudo-BMA
+weights under the Bayesian bootstrap (Y. Yao, A. Vehtari, D. Simpson, A. Gelman, Bayesian Analysis 13 (2018) 917) turn the
+differences into probabilities.
 """
 
 import math
@@ -40,7 +41,7 @@ PART = 50_000  # rows of a sum that are weighted at once
 
 @dataclass(frozen=True)
 class Linearised:
-    """A fit as cross-validation needs it.
+    """A fit in the form that cross-validation needs.
 
     Parameters
     ----------
@@ -64,9 +65,9 @@ class Blocks:
     ----------
     block : (n,) block of each row.
     fold : (b,) fold of each block; `UNSEEN` for blocks that no fit sees.
-    gap : rows on either side of a block that is left out which its fit does not see either.
-    least : scale that errors have at least, such as that of rounding. Where a machine rests, rounded samples and a model may agree
-        to the last digit, which says nothing of how well the model predicts.
+    gap : rows on either side of a left-out block that its fit does not see either.
+    least : lower limit of the error scale, such as that of rounding. At rest, rounded samples and a model may agree to the
+        last digit, which does not show how well the model predicts.
     """
 
     block: Whole
@@ -76,9 +77,9 @@ class Blocks:
 
     @classmethod
     def of(cls, record: Whole, gap: int = 0, unseen: Whole | None = None, least: float = 0.0) -> "Blocks":
-        """Blocks of rows that belong to the records `record` (n,), numbered from 0 in order; each has its share of blocks.
+        """Blocks of rows that belong to the records `record` (n,), numbered from 0 in order.
 
-        Those of the records numbered in `unseen` are in no fold.
+        The number of blocks of a record is proportional to its length. Blocks of the records in `unseen` are in no fold.
         """
         total = max(len(record), 1)
         block = np.zeros(len(record), dtype=np.int64)
@@ -105,16 +106,16 @@ class Blocks:
         return len(self.fold)
 
     def sums(self, values: Array) -> Array:
-        """Sums (b,) of values (n,) over each block."""
+        """Sums (b,) of values (n,) over the blocks."""
         return np.asarray(np.bincount(self.block, values, self.count), dtype=np.float64)
 
     def split(self, values: Array) -> list[Array]:
-        """Values (n,) of each block, b arrays."""
+        """Values (n,) split into blocks, b arrays."""
         ends = np.cumsum(np.bincount(self.block, minlength=self.count))
         return np.split(values[np.argsort(self.block, kind="stable")], ends[:-1])
 
     def left_out(self, fold: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Rows (n,) that a fold leaves out, and those that its fit sees: the others but for the gaps, and for what no fit sees."""
+        """Rows (n,) that a fold leaves out, and rows (n,) that its fit sees: the others without gaps and unseen blocks."""
         of_row = self.fold[self.block]
         out = of_row == fold
         near = out.copy()
@@ -127,9 +128,10 @@ class Blocks:
 
 @dataclass(frozen=True)
 class CrossValidated:
-    """Errors (n,) of prediction of every row by the fit that did not see it, and the scale (b,) that the fit expected in each block.
+    """Prediction errors (n,), each of a fit that did not see the row, and the scale (b,) that the fit expected in each block.
 
-    `penalty` is taken off the log density of every row that a fit sees: what freedom costs that cross-validation does not see.
+    `penalty` is subtracted from the log density of every row that a fit sees. It is the cost of free initial states, which
+    cross-validation does not include.
     """
 
     error: Array
@@ -140,9 +142,9 @@ class CrossValidated:
 def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
     """Predict every block from the others.
 
-    The fit of the other blocks has what one row of all says of the parameters as a prior about the fit of all (unit information:
-    R. E. Kass, L. Wasserman, J. Am. Stat. Assoc. 90 (1995) 928). A direction that the block itself determines, and the others next
-    to not at all, would else go as far as noise drives it, where the linearisation is no prediction.
+    The fit of the other blocks has the fit of all blocks as a prior, with the information of one average row (unit
+    information: R. E. Kass, L. Wasserman, J. Am. Stat. Assoc. 90 (1995) 928). Without this prior, noise would move the
+    parameters far along a direction that only the left-out block determines, beyond the range of the linearisation.
     """
     residual, jacobian = fit.residual, fit.jacobian
     error, scale = residual.copy(), np.ones(blocks.count)
@@ -159,7 +161,9 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
             normal, right = _normal_equations(jacobian, weight, residual)
             normal = normal / np.outer(norms, norms) + precision
             step = np.linalg.lstsq(normal, right / norms + pull, rcond=1e-12)[0] / norms
-            change = jacobian @ -step  # the jacobian of long records is too large for a negative copy
+            change = (
+                jacobian @ -step
+            )  # avoids a negated copy of the jacobian, which is large for long records
             spread = max(scale_of((residual + change)[seen]), blocks.least)
         error[out] += change[out]
         scale[blocks.fold == fold] = spread
@@ -167,7 +171,7 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
 
 
 def _unit_information(residual: Array, jacobian: Array, blocks: Blocks) -> Array:
-    """What one row of those that the folds see says of the parameters, on average: their information (p, p) over their number."""
+    """Average information (p, p) on the parameters of one row that the folds see."""
     seen = blocks.fold[blocks.block] != UNSEEN
     spread = max(scale_of(residual[seen]), blocks.least)
     weight = np.where(seen, weights_of(residual, spread) / spread**2, 0.0)
@@ -175,7 +179,7 @@ def _unit_information(residual: Array, jacobian: Array, blocks: Blocks) -> Array
 
 
 def _normal_equations(jacobian: Array, weight: Array, residual: Array) -> tuple[Array, Array]:
-    """JᵀWJ (p, p) and JᵀWr (p,), summed over parts of the rows: a weighted copy of all rows of long records would be large."""
+    """JᵀWJ (p, p) and JᵀWr (p,), summed in parts: a weighted copy of all rows of long records would be large."""
     normal, right = np.zeros((jacobian.shape[1],) * 2), np.zeros(jacobian.shape[1])
     for first in range(0, len(jacobian), PART):
         part = slice(first, first + PART)
@@ -190,8 +194,8 @@ def prediction(
 ) -> Prediction:
     """The blocks' log densities and squared errors.
 
-    `time` is the autocorrelation time in samples, the same for all hypotheses; `measured` (n,) are the errors in the unit of
-    the measurement, where those that are scored are whitened.
+    `time` is the autocorrelation time [samples], the same for all hypotheses. `measured` (n,) are the errors in the unit of
+    the measurement, where the scored ones are whitened.
     """
     seen = blocks.fold != UNSEEN
     counts = blocks.sums(np.ones(len(found.error)))
@@ -203,7 +207,7 @@ def prediction(
 def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[Prediction]:
     """Predictions of several hypotheses on the same rows, which belong to the records `record` (n,).
 
-    The autocorrelation time is that of the hypothesis that predicts best: what the others leave is no noise.
+    The autocorrelation time is that of the hypothesis that predicts best, because the errors of the others are not noise.
     """
     found = [cross_validate(fit, blocks) for fit in fits]
     if not found:
@@ -213,52 +217,56 @@ def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[P
 
 
 def time_of_best(found: Sequence[CrossValidated], record: Whole) -> float:
-    """Autocorrelation time in rows of the errors of what predicts best."""
+    """Autocorrelation time [rows] of the errors of the best prediction."""
     best = min(found, key=lambda one: float(np.sum(one.error**2)))
     return autocorrelation_time(best.error, record)
 
 
 def difference(first: Prediction, second: Prediction) -> tuple[float, float]:
-    """By how much the first predicts better than the second, and the standard error of that, both in log density."""
+    """Log density by which the first predicts better than the second, and its standard error."""
     return _summed(first.log_density - second.log_density)
 
 
 def removed(first: Prediction, second: Prediction) -> tuple[float, float]:
-    """By how much smaller the first's mean squared error is than the second's, and the standard error of that."""
+    """Reduction of the mean squared error from the second to the first, and its standard error."""
     total, error = _summed(second.squared_error - first.squared_error)
     samples = max(float(second.samples.sum()), 1.0)
     return total / samples, error / samples
 
 
 def weight_for(first: Prediction, second: Prediction) -> float:
-    """Logarithm of the odds that the data bring for the first against the second, no block more than `BLOCK_ODDS`.
+    """Logarithm of the odds that the data give the first against the second, limited to `BLOCK_ODDS` for each block.
 
-    Of the second, were it true, the odds of a block are at most one in the mean, however rarely they are large. So they exceed
-    1/a by chance in a share a of cases at most (Markov's inequality; V. Vovk, R. Wang, Ann. Stat. 49 (2021) 1736). What a block
-    says against the first counts in full: an effect that helps here and harms there has no weight.
+    If the second is true, the expected odds of a block are at most one. By chance the odds therefore exceed 1/a in at most a
+    share a of cases (Markov's inequality; V. Vovk, R. Wang, Ann. Stat. 49 (2021) 1736). Evidence against the first counts
+    without limit: an effect that helps in one block and harms in another gains no weight.
     """
     return float(np.minimum(first.log_density - second.log_density, math.log(BLOCK_ODDS)).sum())
 
 
 def chance_better(first: Prediction, second: Prediction, least: float) -> float:
-    """Chance that the first predicts better than the second by more than the log density `least`, under the Bayesian bootstrap
-    of the blocks."""
+    """Chance that the first predicts better than the second by more than the log density `least`.
+
+    Computed by the Bayesian bootstrap of the blocks.
+    """
     gain = first.log_density - second.log_density
     found = len(gain) * _resampled(len(gain)) @ gain - least
     return float(np.mean(expit(found)))
 
 
 def detectable(error: Array, time: float) -> float:
-    """The smallest rms that would show among errors (n,) of this autocorrelation time, in their unit: what adds `SHOWS` standard
-    deviations of their mean square to it."""
+    """The smallest detectable rms among errors (n,) of this autocorrelation time, in their unit.
+
+    It adds `SHOWS` standard deviations to the errors' mean square.
+    """
     return math.sqrt(SHOWS * float(np.mean(error**2)) * math.sqrt(2.0 * time / max(len(error), 1)))
 
 
 def gain_ahead(first: Prediction, second: Prediction) -> float:
-    """By how many standard errors the first predicts better what no fit has seen; infinite where nothing is held out.
+    """Standard errors by which the first predicts unseen blocks better than the second; infinite where nothing is held out.
 
-    A line that is no more than the ringing of a resonance, or a drift that is none, predicts blocks between others that its
-    fit saw. It does not predict what comes after them.
+    A spectral line that is only the ringing of a resonance, or a spurious drift, predicts blocks between others that its
+    fit saw. It does not predict the blocks after them.
     """
     if first.unseen is None or not first.unseen.any():
         return math.inf
@@ -267,19 +275,19 @@ def gain_ahead(first: Prediction, second: Prediction) -> float:
 
 
 def _summed(gain: Array) -> tuple[float, float]:
-    """Sum of differences in each block and its standard error."""
+    """Sum of the blocks' differences, and its standard error."""
     count = len(gain)
     error = math.sqrt(count) * float(np.std(gain, ddof=1)) if count > 1 else math.inf
     return float(gain.sum()), error
 
 
 def _resampled(count: int) -> Array:
-    """Weights (draws, count) of the Bayesian bootstrap of so many blocks; each draw sums to one."""
+    """Weights (draws, count) of the Bayesian bootstrap of `count` blocks; each draw sums to one."""
     return np.random.default_rng(0).dirichlet(np.ones(count), DRAWS)
 
 
 def probabilities(hypotheses: Sequence[Hypothesis]) -> Array:
-    """Probability (h,) of each hypothesis among these: pseudo-BMA weights under the Bayesian bootstrap of the blocks."""
+    """Probability (h,) of each of these hypotheses: pseudo-BMA weights under the Bayesian bootstrap of the blocks."""
     if not hypotheses:
         return np.zeros(0)
     densities = np.array([one.prediction.log_density for one in hypotheses])

@@ -1,7 +1,7 @@
-"""Families: the kind of physics that is missing, which the records may tell where they do not tell the law.
+"""Families: the kind of missing physics, which the records may determine where they do not determine the law.
 
-Coulomb friction, Stribeck friction and hysteresis are laws of one family. Where several of them predict about as well, or where each
-leaves a little that the true one would not, each name is uncertain and the family is not.
+Coulomb friction, Stribeck friction and hysteresis are laws of one family. Several of them may predict about as well, or each may
+leave a small mismatch that the true law would not. Then each name is uncertain, but the family is not.
 """
 
 from collections.abc import Collection, Mapping
@@ -11,7 +11,7 @@ from rhythmid.diagnose.hypothesis import Hypothesis
 from rhythmid.diagnose.probability import chance_of_law, removed_by
 from rhythmid.diagnose.selection import Contest
 
-LISTED = 0.01  # weight from which a law is listed: to about this the Bayesian bootstrap knows a weight, see `DRAWS`
+LISTED = 0.01  # weight from which a law is listed: about the accuracy of a weight by the Bayesian bootstrap, see `DRAWS`
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class MissingFamily:
     Parameters
     ----------
     family : its name.
-    laws : names of its laws that the evidence leaves open, the one with the largest weight first; the chosen ones among them.
+    laws : names of its laws that the evidence leaves open, the largest weight first; they include the chosen ones.
     share : share of the mismatch on held-out data that the laws of the chosen hypothesis explain.
-    probability : that the truth has a law of this family.
+    probability : probability that the truth contains a law of this family.
     """
 
     family: str
@@ -41,15 +41,18 @@ def families_of(
     open_: Collection[str],
     size_errors: Mapping[str, float],
 ) -> tuple[MissingFamily, ...]:
-    """Families of the chosen hypothesis' effects, that with the largest share first.
+    """Families of the chosen hypothesis' effects, the one with the largest share first.
 
     Parameters
     ----------
-    shares, weights : of the effects by label, and of the hypotheses by key.
+    contest, chosen : all hypotheses, and the chosen one.
+    shares : shares of the mismatch that the effects explain, by label.
+    weights : weights of the hypotheses, by key.
     left : share of the mismatch that the chosen hypothesis is expected to leave.
-    open_ : labels of its effects that are hardly true; what those of another family explain may be this one's as well.
-    size_errors : relative standard deviations of the effects' sizes, by label. The largest one of a family speaks for it: what is in a
-        limit of its law may be one of a law of another family.
+    open_ : labels of its effects that are probably not the true laws. The mismatch that those of another family explain may
+        be due to this family.
+    size_errors : relative standard deviations of the effects' sizes, by label. For a family that of its effect with the largest
+        share counts: an effect at a limit of its law may also be a law of another family.
     """
     labels: dict[str, list[str]] = {}
     for label, name in zip(chosen.elements, chosen.names):
@@ -64,7 +67,7 @@ def families_of(
         chance = chance_of_law(share, left + removed_by(others, chosen, contest), vague, family) * held
         own = [
             name for name in chosen.names if chosen.family.get(name) == family
-        ]  # as good as those with more weight
+        ]  # laws that predict as well as those with more weight
         found.append(MissingFamily(family, tuple(dict.fromkeys((*laws, *own))), share, chance))
     return tuple(sorted(found, key=lambda one: -one.share))
 
@@ -72,7 +75,7 @@ def families_of(
 def _laws(
     contest: Contest, family: str, weights: Mapping[tuple[str, ...], float]
 ) -> tuple[tuple[str, ...], float]:
-    """Laws of a family by the weight of the hypotheses that hold them, and the weight of those that hold any."""
+    """Laws of a family, sorted by the weight of the hypotheses that contain them, and the weight of those that contain any."""
     by_name: dict[str, float] = {}
     held = 0.0
     for one in contest.hypotheses:

@@ -1,7 +1,8 @@
-"""Fine steps: the chosen model fitted again with integration steps so short that they move no estimate.
+"""Fine steps: refit the chosen model with integration steps so short that they do not bias the estimates.
 
-The search compares models, for which an integration error of a tenth of the noise is nothing. Estimates are another matter: the
-error is the same in every period of the motion, and over ten thousand samples a hundredth of the noise can be a standard deviation.
+The search compares models, for which an integration error of a tenth of the noise does not matter. It matters for estimates:
+the error is the same in every period of the motion, so that over ten thousand samples a hundredth of the noise can shift an
+estimate by a standard deviation.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -12,12 +13,14 @@ from rhythmid.errors import InputError
 from rhythmid.identify.free_run import halved, sufficient
 from rhythmid.identify.output_error import INTEGRATION, minimise
 
-HALVINGS = 2  # of the step: the error of smooth forces falls to a 256th
+HALVINGS = 2  # halvings of the step: for smooth forces the error falls to a 256th
 
 
 def finely_stepped(found: Search, pool: ThreadPoolExecutor | None = None) -> Search:
-    """The search with the fit of its chosen model at shorter steps; as it is where no effect was chosen, whose fit had them, or
-    where the model diverges."""
+    """Refit the chosen model of a search with shorter steps.
+
+    Returns the search unchanged where no effect was chosen, because that fit already used them, or where the model diverges.
+    """
     if not found.best.added:
         return found
     fit = found.fit

@@ -1,8 +1,9 @@
-"""Free functions beside a fitted model, for a force or a sensor's error that no law is known of.
+"""Free functions beside a fitted model, for a force or a sensor error of unknown law.
 
-A missing force is a smooth function of one quantity (position, velocity, both, actuator force, time), or what a few filters, of first
-order and resonant, remember of the velocity or of the actuator's force, or what springs that slip remember of the position, or a vibration; the
-sensor's error is a function of its output. Each is a sum of functions whose effects on the free run are simulated.
+A missing force is a smooth function of one quantity (position, velocity, both, actuator force, time), a vibration, or a
+force with memory: first-order and resonant filters of the velocity or the actuator force, or slipping springs driven by the
+position. A sensor error is a function of the sensor's output. Each free function is a sum of basis functions, whose
+effects on the free run are simulated.
 """
 
 import math
@@ -21,14 +22,14 @@ from rhythmid.diagnose.search.score_tests import Trajectories, residual_line
 from rhythmid.parallel import each
 
 Array = NDArray[np.float64]
-SPLINES, SPLINES_OF_TWO = 8, 5  # basis functions of one quantity, and of each of two
-TIME_CONSTANTS = (0.003, 0.01, 0.03, 0.1, 0.3)  # of filters that remember, in periods of the motion
-# of filters that resonate at the residual's strongest line: a light and a heavy one, between which those of real second modes lie
+SPLINES, SPLINES_OF_TWO = 8, 5  # basis functions of one quantity, and of each of two quantities
+TIME_CONSTANTS = (0.003, 0.01, 0.03, 0.1, 0.3)  # of first-order filters, in periods of the motion
+# damping ratios of filters that resonate at the residual's strongest line; those of real second modes lie between them
 DAMPING_RATIOS = (0.03, 0.2)
-# displacements at which springs slip, in ranges of the position: those of other springs lie between (a sum of such springs is any
-# hysteresis of Prandtl and Ishlinskii: M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, 1996, chapter 2)
+# displacements at which the springs slip, in ranges of the position; those of real springs lie between them. A sum of such
+# springs is any Prandtl-Ishlinskii hysteresis (M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, 1996, chapter 2)
 SLIPS = (0.015, 0.05, 0.1, 0.2, 0.3)
-# quantities of which the free function is a spline, with the name of the same map in the simulator
+# quantities of spline functions, with the name of the same map in the simulator
 SPLINED = {
     "position": "position",
     "velocity": "velocity",
@@ -39,9 +40,9 @@ SPLINED = {
 
 @dataclass(frozen=True)
 class FreeMap:
-    """A free function: `columns[i][s]` is the change of series s's block averages for a unit of its i-th coefficient.
+    """A free function: `columns[i][s]` (blocks,) is the change of series s's block averages per unit of coefficient i.
 
-    `grid` and `basis` (i, g) draw a function of one quantity; both are empty for others.
+    `grid` (g,) and `basis` (i, g) draw a function of one quantity; both are empty for others.
     """
 
     quantity: str
@@ -51,7 +52,7 @@ class FreeMap:
 
 
 def _splines(values: Sequence[Array], count: int) -> tuple[list[list[Array]], Array, Array]:
-    """Cubic B-splines over the middle 99.8 % of the values: functions of each series, a grid, the functions on it."""
+    """Cubic B-splines over the middle 99.8 % of the values: functions of each series, a grid, and the functions on the grid."""
     joined = np.concatenate(values)
     low, high = np.quantile(joined, [0.001, 0.999])
     if high <= low:
@@ -67,7 +68,7 @@ def _splines(values: Sequence[Array], count: int) -> tuple[list[list[Array]], Ar
 
 
 def _remembered(values: Sequence[Array], times: Sequence[Array], frequency: float) -> list[list[Array]]:
-    """What first-order filters remember of signals: one function for each time constant."""
+    """Signals after first-order filters: one function for each time constant."""
     found = []
     for share in TIME_CONSTANTS:
         function = []
@@ -80,8 +81,10 @@ def _remembered(values: Sequence[Array], times: Sequence[Array], frequency: floa
 
 
 def _resonant(values: Sequence[Array], times: Sequence[Array], line: float) -> list[list[Array]]:
-    """What filters that resonate at the frequency `line` [Hz] remember of signals, in phase with their force and a quarter turn
-    ahead: a part on a spring moves like one of them, whatever its damping ratio between theirs."""
+    """Signals after filters that resonate at the frequency `line` [Hz], in phase with the filter's force and 90° ahead.
+
+    A part on a spring moves like a combination of these, for any damping ratio between theirs.
+    """
     found = []
     for ratio in DAMPING_RATIOS:
         pairs = []
@@ -96,14 +99,16 @@ def _resonant(values: Sequence[Array], times: Sequence[Array], line: float) -> l
 
 
 def _slipped(values: Sequence[Array]) -> list[list[Array]]:
-    """What springs that slip remember of signals: one function for each displacement at which they slip. A sum of them is any hysteresis
-    that does not depend on speed and whose loops are alike wherever they begin."""
+    """Signals after slipping springs: one function for each displacement at which a spring slips.
+
+    A sum of them is any rate-independent hysteresis whose loops have the same shape wherever they begin.
+    """
     reach = max(float(np.ptp(value)) for value in values)
     return [[stretched(value, share * reach) for value in values] for share in SLIPS]
 
 
 def stretched(values: Array, most: float) -> Array:
-    """How far a spring is stretched whose end follows a signal (n,) and which slips at `most` in either direction; at first it is not."""
+    """Extension (n,) of a spring, relaxed at first, whose end follows a signal (n,) and which slips at ±`most`."""
     held = accumulate(values.tolist(), lambda foot, value: min(max(foot, value - most), value + most))
     return values - np.fromiter(held, dtype=np.float64, count=len(values))
 
@@ -111,7 +116,7 @@ def stretched(values: Array, most: float) -> Array:
 def _simulated(
     known: Trajectories, functions: Iterable[list[Array]], pool: ThreadPoolExecutor | None
 ) -> tuple[tuple[Array, ...], ...]:
-    """Outputs' changes when each function acts as a force."""
+    """Changes of the outputs when each function acts as a force."""
 
     def one(function: list[Array]) -> tuple[Array, ...]:
         changes = []
@@ -124,14 +129,14 @@ def _simulated(
 
 
 def values_of(known: Trajectories, name: str) -> list[Array]:
-    """Values of the quantity that a spline depends on, of each series; `name` is that of the simulator's map, as in `SPLINED`."""
+    """Values (n,) of a spline's quantity, one array for each series; `name` is that of the simulator's map, as in `SPLINED`."""
     if name == "signal":
         return list(known.outputs)
     return [getattr(path, name) for path in (known.paths if name == "effort" else known.legs)]
 
 
 def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
-    """The free functions beside a fitted model, each made when it is asked for: over long records each is large."""
+    """The free functions beside a fitted model, computed on demand because each is large for long records."""
     fit = known.fit
     yield from motion_maps(known, pool)
     quantities: dict[str, list[Array]] = {"time": [p.time - p.time[0] for p in known.paths]}
@@ -159,7 +164,7 @@ def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> It
 
 
 def motion_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
-    """Forces that are any function of the position, and of the velocity."""
+    """Forces that are arbitrary functions of the position, and of the velocity."""
     for name in ("position", "velocity"):
         functions, grid, basis = _splines(values_of(known, name), SPLINES)
         if functions:
@@ -167,7 +172,7 @@ def motion_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> 
 
 
 def filtered(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
-    """Forces that linear filters make of the past velocity and of the past actuator force: a linear part that the model lacks."""
+    """Linear filters of the past velocity and of the past actuator force: a linear dynamic part that the model lacks."""
     times, frequency = [p.time for p in known.paths], _frequency(known)
     past = {"past velocity": values_of(known, "velocity")}
     if _driven(known):

@@ -1,8 +1,8 @@
-"""Free maps: an unknown smooth law of one quantity, as elements that the simulator runs.
+"""Free maps: an unknown smooth law of one quantity, as an element that the simulator runs.
 
-F(z) = Σ c_i B_i((z − low) / (high − low)), with uniform cubic B-splines B_i (C. de Boor, A Practical Guide to Splines, 2001);
-beyond the ends it stays as it is there. "Unknown physics" is such a map in the place of names. Several effects that are
-laws of the same quantity are a series for one law: the map says whether one would do.
+F(z) = Σ c_i B_i((z − low) / (high − low)), with uniform cubic B-splines B_i (C. de Boor, A Practical Guide to Splines, 2001),
+constant beyond the ends. "Unknown physics" means such a map instead of named effects. Several effects that are laws of the same
+quantity together approximate one law; the map shows whether one law would suffice.
 """
 
 from collections.abc import Mapping
@@ -15,13 +15,13 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 COEFFICIENTS = 10
-MARGIN = 0.05  # of the range of its quantity, by which a map reaches further on either side
-LEAST_RANGE = 1e-9  # range of a map whose quantity never changes, as a share of its size
+MARGIN = 0.05  # share of its quantity's range by which a map extends beyond the range on either side
+LEAST_RANGE = 1e-9  # range of a map whose quantity never changes, as a share of the quantity's size
 
 
 def _force(x, v, t, f, low, high, share, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9):
     z = (1.0 - share) * x + share * v
-    if z != z:  # of a run that has diverged
+    if z != z:  # NaN: the run has diverged
         return z
     s = min(max((z - low) / (high - low) * 7.0, 0.0), 7.0 - 1e-12)
     i = int(s)
@@ -47,7 +47,7 @@ def _signal(z, t, low, high, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9):
 
 
 def _element(name: str, slot: Slot, quantity: str, share: float | None = None) -> Element:
-    """The element of one quantity; of a force, `share` is 0 for the position and 1 for the velocity."""
+    """The element for one quantity; for a force, `share` is 0 for the position and 1 for the velocity."""
     chosen = (
         ()
         if share is None
@@ -79,14 +79,14 @@ FREE_MAPS: Mapping[str, Element] = {
 
 
 def first_guess(values: Array) -> dict[str, float]:
-    """Values of a map over the range of a quantity (n,), zero everywhere."""
+    """Values of a map that is zero over the range of a quantity (n,)."""
     low, high = (float(end) for end in np.quantile(values, [0.0, 1.0]))
     margin = max(MARGIN * (high - low), LEAST_RANGE * max(abs(low), abs(high)), LEAST_RANGE**2)
     return {"low": low - margin, "high": high + margin} | {f"c{i}": 0.0 for i in range(COEFFICIENTS)}
 
 
 def without_free_maps(model: Model) -> Model:
-    """The model without free maps, which no model file can name."""
+    """The model without its free maps, which a model file cannot contain."""
     for term in model.terms:
         if term.element in FREE_MAPS.values():
             model = model.without(term.label)

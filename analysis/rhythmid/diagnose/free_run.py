@@ -1,4 +1,4 @@
-"""Diagnosis in free run or in windows: the search, its contenders and their evidence, and the fit that an answer is made from."""
+"""Diagnosis in free run or in windows: the search, the contenders and their evidence, and the fit behind the answer."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -58,7 +58,7 @@ from rhythmid.identify.record_scales import scales
 from rhythmid.identify.robust_covariance import with_robust_covariance
 from rhythmid.identify.student import autocorrelation_time
 
-# what competes beside the effects that were searched for, where there is time
+# hypotheses that compete beside those of the search, if there is time
 OTHER_KINDS = ("freed values, longer delays, other places, free functions and related laws",)
 INTERVALS = ("intervals followed along the likelihood, and integration in finer steps",)
 BEFORE = ("what the mismatch of the nominal model depends on",)
@@ -69,11 +69,11 @@ RERUN = ("free runs over the held-out records for the report",)
 
 @dataclass(frozen=True)
 class FreeRunResult:
-    """Everything behind an answer that was scored in free run or in windows.
+    """All data behind an answer from free-run or window scoring.
 
-    `search` holds the chosen model as its `best`, with its fit; `before` and `after` are the free maps beside the nominal and
-    beside the chosen model; `unseen_nominal` and `unseen_augmented` their runs over separate held-out records; `size_errors` the
-    relative standard deviations of the chosen effects' sizes, by label.
+    `search` holds the chosen model as its `best`, with its fit. `before` and `after` are the free maps beside the nominal and
+    the chosen model. `unseen_nominal` and `unseen_augmented` are their runs over separate held-out records. `size_errors` are
+    the relative standard deviations of the chosen effects' sizes, by label.
     """
 
     scoring: Scoring
@@ -91,7 +91,7 @@ class FreeRunResult:
 
 
 def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
-    """Search, weigh and decide; what the budget of the case leaves no time for is told among what the search has excluded."""
+    """Search, weigh and decide; steps that the case's budget left no time for are listed in the search's `excluded`."""
     with deadline(case.budget.at(1.0)):
         return _free_run(case, scoring)
 
@@ -193,7 +193,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
 
 
 def _followed(found: Search, case: Case) -> Search:
-    """The search with a fit of its chosen model whose intervals hold, as far as there is time."""
+    """Refine the fit and the intervals of the chosen model as far as there is time."""
     for step in (finely_stepped, profiled, ticks_followed):
         if time_is_up():
             break
@@ -204,17 +204,17 @@ def _followed(found: Search, case: Case) -> Search:
 
 
 def _told(found: Search, untried: tuple[str, ...]) -> Search:
-    """The search that tells what was not tried, or not brought to its end, where time was up meanwhile."""
+    """The search with `untried` added to its exclusions if time is up."""
     return _untried(found, untried) if time_is_up() else found
 
 
 def _untried(found: Search, what: tuple[str, ...]) -> Search:
-    """The search that tells what there was no time for."""
+    """The search with `what` added to its exclusions for lack of time."""
     return replace(found, excluded=(*found.excluded, (what, SPENT)))
 
 
 def _weighed(found: Search, trials: Sequence[Trial], contenders: Sequence[Contender]) -> Search:
-    """The search that tells, where time is up, which models that were fitted were not weighed on unseen data."""
+    """The search, extended if time is up by the fitted models that were not weighed on unseen data."""
     if not time_is_up():
         return found
     known = {one.trial.added for one in contenders}
@@ -225,7 +225,7 @@ def _weighed(found: Search, trials: Sequence[Trial], contenders: Sequence[Conten
 
 
 def _unconverged(nominal: Fit, found: Search) -> list[tuple[tuple[str, ...], str]]:
-    """Which of the refitted nominal model and the chosen one a deadline has stopped before its end."""
+    """Which of the refitted nominal model and the chosen model were stopped by a deadline before convergence."""
     named = {"nominal": nominal, "chosen" if found.best.added else "nominal": found.fit}
     return [
         ((f"convergence of the {name} model",), SPENT) for name, fit in named.items() if fit.message == SPENT
@@ -233,8 +233,11 @@ def _unconverged(nominal: Fit, found: Search) -> list[tuple[tuple[str, ...], str
 
 
 def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.float64]:
-    """Mean product (p, p) of the errors of the fit's parameters that come from small effects which it lacks: of each element
-    that the model could still lack the guess which the last round scored best, and forces that are any function of position or velocity."""
+    """Mean product (p, p) of the fit's parameter errors due to small effects that it lacks.
+
+    The effects are: for each element that the model may lack, the guess with the best score in the last round; and forces
+    that are arbitrary functions of position or velocity.
+    """
     fit = found.fit
     made = np.zeros((len(fit.names), len(fit.names)))
     lacking = candidates(catalogue, fit.model.setting, scales(fit.run.series, fit.model)).tried
@@ -247,7 +250,7 @@ def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.floa
         return made
     line, run = fit.linearisation, trajectories(fit)
     maps = [column for one in motion_maps(run, case.pool) for column in one.columns]
-    # filled one by one: of long records all of them twice would be large
+    # filled in place: for long records a second copy of all columns would be too large
     columns = np.empty((len(line.residual), len(tried) + len(maps)), order="F")
     count = 0
     for outputs in chain((one.outputs for one in changes_of(run, tried, case.pool)), maps):
@@ -261,7 +264,7 @@ def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.floa
 
 
 def _with_jitter(scoring: Scoring) -> Calibration:
-    """The calibrated nominal model; what jitter of the commands excites is its noise, where that shows in free run."""
+    """The calibrated nominal model; in free run, the response to a visible jitter of the commands is added to its noise."""
     found = scoring.calibration
     jitter = command_jitter(found.fit) if scoring.kind == "free_run" else None
     if jitter is None:
@@ -276,7 +279,7 @@ def _trial_of(hypothesis: Hypothesis, contenders: Sequence[Contender]) -> Trial:
 
 
 def _with_best(found: Search, trial: Trial, case: Case) -> Search:
-    """The search with another model chosen."""
+    """The search with another chosen model."""
     if tuple(sorted(trial.added)) == tuple(sorted(found.best.added)):
         return found
     fit = whole_fit(trial, found.fit.run.series, found.noise, found.fit.run.max_step, pool=case.pool)
@@ -320,8 +323,10 @@ def _maps(
     contenders: Sequence[Contender],
     rows: Rows,
 ) -> dict[str, Prediction]:
-    """Predictions of the free maps, the refitted one in the place of its like where it predicts better, under the autocorrelation
-    time of the contenders'."""
+    """Predictions of the free maps, under the autocorrelation time of the contenders.
+
+    A refitted map replaces the linearised one of the same quantity where it predicts better.
+    """
     time = remembered(contenders, rows)
     maps = {
         one.quantity: prediction(one.found, rows.blocks, time, measured_errors(one.found.error, rows))
@@ -335,6 +340,6 @@ def _maps(
 
 
 def _detectable(contenders: Sequence[Contender], chosen: Hypothesis, rows: Rows) -> float:
-    """The smallest rms that would show in these records, as a share of what errors are a share of."""
+    """The smallest detectable rms in these records, relative to the size that errors are a share of."""
     error = next(one.error for one in contenders if tuple(sorted(one.trial.added)) == chosen.key)
     return detectable(error, autocorrelation_time(error, rows.record)) / max(rows.size, 1e-300)

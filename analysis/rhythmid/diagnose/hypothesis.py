@@ -1,4 +1,4 @@
-"""A hypothesis: one explanation of the records, fitted, with what it predicts of data that its fit has not seen."""
+"""A hypothesis: one fitted explanation of the records, with its prediction of data that its fit has not seen."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,11 +17,11 @@ Kind = Literal["nominal", "effects", "freed_value", "delay", "location", "free_m
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a hypothesis predicts of each block (b,) of data that its fit has not seen.
+    """The scores of a hypothesis in each block (b,) of data that its fit has not seen.
 
-    `log_density` is the sum of the block's log predictive densities, divided by the autocorrelation time of the residual;
-    `squared_error` the sum of squared errors, and `samples` their number. `unseen` marks the blocks of which no fit has seen even
-    the neighbours: the held-out ends of records, and separate held-out ones.
+    `log_density` is the sum of the block's log predictive densities, divided by the autocorrelation time of the residual.
+    `squared_error` is the sum of squared errors, and `samples` their number. `unseen` marks held-out blocks, of which no fit
+    has seen even the neighbours: the hidden ends of records, and separate records.
     """
 
     log_density: Array
@@ -46,17 +46,16 @@ class Hypothesis:
 
     Parameters
     ----------
-    elements : labels of the effects that the nominal model is given, in the order in which they were found; of a freed
-        value its parameter's name.
-    names : catalogue names of the effects, in the same order; a freed value's own name.
-    kind : what is supposed.
+    elements : labels of the added effects, in the order in which they were found; for a freed value its parameter's name.
+    names : catalogue names of the effects, in the same order; for a freed value its own name.
+    kind : kind of hypothesis.
     free : number of free parameters.
-    prediction : of blocks that the fit has not seen; the blocks are those of all hypotheses of a case.
+    prediction : scores in blocks that the fit has not seen; all hypotheses of a case have the same blocks.
     heldout_nrmse : error on held-out data, as a share of the motion or the effort; None where there are none.
-    shape : statistics of the fitted effects themselves, by the name of the rule that looks at them.
-    richer : of each name, the laws that contain it.
-    values : the free parameters as fitted.
-    family : of each name of the catalogue, its family; "" where it has none.
+    shape : statistics of the fitted effects themselves, by the name of the rule that uses them.
+    richer : for each name, the laws that contain it.
+    values : the fitted values of the free parameters.
+    family : for each name of the catalogue, its family; "" where it has none.
     """
 
     elements: tuple[str, ...]
@@ -75,7 +74,7 @@ class Hypothesis:
         cls, model: Model, elements: tuple[str, ...], kind: Kind, free: int, prediction: Prediction,
         heldout_nrmse: float | None, shape: Mapping[str, float], values: Mapping[str, float],
     ) -> "Hypothesis":  # fmt: skip
-        """The hypothesis that a fitted model is, with what the catalogue says of its effects."""
+        """The hypothesis of a fitted model, with the catalogue's data of its effects."""
         terms = [model.term(label) for label in elements]
         names = tuple(label if one is None else one.element.name for label, one in zip(elements, terms))
         effects = [one.element for one in terms if one is not None]
@@ -85,16 +84,16 @@ class Hypothesis:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Labels of effects; a freed value and a delay go by the name of a parameter, "label.parameter"."""
+        """Labels of effects. A freed value and a delay are not effects; they have the form "label.parameter"."""
         return tuple(label for label in self.elements if "." not in label)
 
     @property
     def key(self) -> tuple[str, ...]:
-        """The elements in alphabetical order: the same for the same structure."""
+        """The elements in alphabetical order, equal for equal structures."""
         return tuple(sorted(self.elements))
 
 
 def special_case(first: Hypothesis, second: Hypothesis) -> bool:
-    """Whether the first is the second but for one effect, of which its own is a special case."""
+    """Whether the hypotheses differ in one effect only, and that of the first is a special case of that of the second."""
     mine, other = set(first.names) - set(second.names), set(second.names) - set(first.names)
     return len(mine) == len(other) == 1 and other <= set(first.richer.get(next(iter(mine)), ()))

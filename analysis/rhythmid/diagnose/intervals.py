@@ -1,12 +1,12 @@
-"""Do the intervals of the named effects hold? The likelihood is followed to their ends, and beyond where it asks for it.
+"""Check and widen the confidence intervals of the named effects by following the likelihood.
 
-A covariance knows the likelihood's curvature at one point. An effect with a corner (a stop that is touched for a moment, a play
-whose far edge is never reached) can be curved there and flat or falling further on. So every parameter of an effect is
-moved to both ends of its 95 % interval and far beyond, the others along with it as their covariance says: chi2 has to rise by the
-square of the way in standard deviations. Where it does not, the others are fitted again for the moved parameter. If chi2
-then falls, the descent goes on from there; if it hardly rises, the interval is widened until it does, or is open, and
-those of all that was fitted again with it. A plain beside a narrow notch outweighs the notch by its width, so that chi2 has to
-rise the more the further away it is.
+A covariance describes the likelihood's curvature at one point. For an effect with a corner (a stop touched for a moment, a
+play whose far edge is never reached) the likelihood can be curved at that point and flat or lower further on. Every parameter
+of an effect is therefore moved to both ends of its 95 % interval and far beyond. The other parameters follow as their covariance
+predicts. Chi2 has to rise by the square of the distance in standard deviations. Where it does not, the other parameters are
+refitted at the moved parameter. If chi2 then falls, the descent continues from there. If it hardly rises, the interval is widened
+until it does, or is infinite; the intervals of all refitted parameters are widened with it. A flat region beside a narrow
+minimum outweighs the minimum by its width; so the required rise of chi2 grows with the distance.
 (Profile likelihood: S. A. Murphy, A. W. van der Vaart, J. Am. Stat. Assoc. 95 (2000) 449.)
 """
 
@@ -28,22 +28,22 @@ from rhythmid.identify.sensitivity import Problem
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-END = 2.0  # standard deviations at which chi2 should have risen by their square
-FURTHER_DEVIATIONS = 8.0, 32.0  # further ones at which it is looked whether it has
-ODD = 2.0  # times more or less than that rise, from which on the others are fitted again;
-ODD_FURTHER = 8.0  # times less further on, where few likelihoods are parabolas
-FLAT = 0.25  # of that rise with the others fitted, below which an interval is too narrow
-FALLS = 2.0  # by how much chi2 has to be lower elsewhere to go there
-WIDEST = 2.0**20  # standard deviations up to which the rise is sought,
-BEYOND = 30.0  # but no further than this times the parameter's value
-DESCENTS = 3  # to lower minima, at most
-TIED = 0.5  # share of its variance that a parameter of the machine has in common with one of an effect, to be tried, too
-AGAIN = 6  # iterations of the other parameters for a moved one
+END = 2.0  # standard deviations at which chi2 must have risen by their square
+FURTHER_DEVIATIONS = 8.0, 32.0  # further distances at which the rise is checked [standard deviations]
+ODD = 2.0  # factor by which the rise may differ from the expected one before the others are refitted
+ODD_FURTHER = 8.0  # the same at the further distances, below the expected rise only: few likelihoods are parabolas there
+FLAT = 0.25  # share of the expected rise, after refitting the others, below which an interval is too narrow
+FALLS = 2.0  # fall of chi2 from which the descent continues at the other point
+WIDEST = 2.0**20  # largest distance at which the rise is sought [standard deviations]
+BEYOND = 30.0  # the same as a multiple of the parameter's value
+DESCENTS = 3  # largest number of descents to lower minima
+TIED = 0.5  # share of its variance that a machine parameter must have in common with an effect's parameter to be checked, too
+AGAIN = 6  # iterations of the other parameters at a moved one
 
 
 @dataclass(frozen=True)
 class _Way:
-    """From a fit along one of its parameters, to this many standard deviations (negative: downwards) or beyond."""
+    """A step from the fit along one parameter [standard deviations]; negative means downwards."""
 
     place: int
     deviations: float
@@ -53,10 +53,10 @@ class _Way:
 
 
 def profiled(found: Search, pool: ThreadPoolExecutor | None = None) -> Search:
-    """The search with its fit at the lowest minimum within sight, and intervals of its effects that the likelihood bears out.
+    """The search with its fit at the lowest minimum found, and effect intervals that the likelihood confirms.
 
-    A parameter whose likelihood does not rise before its bound, or before it has lost all relation to its value, is
-    undetermined: its variance is infinite. Where a deadline passes the intervals are borne out as far as they were followed.
+    A parameter is undetermined, with infinite variance, if the likelihood rises neither before its bound nor within a
+    meaningful multiple of its value. If a deadline passes, the intervals are confirmed only as far as they were followed.
     """
     reach = np.zeros(len(found.fit.names))
     for _ in range(DESCENTS):
@@ -71,7 +71,7 @@ def profiled(found: Search, pool: ThreadPoolExecutor | None = None) -> Search:
 
 
 def _places(found: Search) -> list[int]:
-    """Where the named effects' determined parameters stand among the fit's, and those of the machine that move with them."""
+    """Indices of the effects' determined parameters among the fit's, and of machine parameters correlated with them."""
     fit = found.fit
     std = np.array([fit.std[name] for name in fit.names])
     known = (std > 0.0) & np.isfinite(std)
@@ -82,8 +82,10 @@ def _places(found: Search) -> list[int]:
 
 
 def _reach(fit: Fit, places: Sequence[int], pool: ThreadPoolExecutor | None) -> tuple[Array, Model | None]:
-    """How far from the fit each parameter (p,) is still likely, as far as the covariance does not say so: infinite where it
-    is undetermined, 0 without such a finding. And the model where chi2 falls, if there is one."""
+    """Distance (p,) up to which each parameter is likely beyond what the covariance says, and a model with lower chi2, if any.
+
+    The distance is infinite for an undetermined parameter, and 0 where the covariance is sufficient.
+    """
     ways = [
         [_Way(place, sign * deviations) for deviations in (END, *FURTHER_DEVIATIONS)]
         for place in places
@@ -105,7 +107,7 @@ def _reach(fit: Fit, places: Sequence[int], pool: ThreadPoolExecutor | None) -> 
 
 
 def _odd(way: _Way, rise: float) -> bool:
-    """Whether chi2 rises otherwise than a parabola along a way."""
+    """Whether the rise of chi2 along a step differs from that of a parabola."""
     due = way.deviations**2
     if abs(way.deviations) > END:
         return rise < due / ODD_FURTHER
@@ -113,14 +115,16 @@ def _odd(way: _Way, rise: float) -> bool:
 
 
 def _enough(way: _Way) -> float:
-    """Rise of chi2 at the end of a way, beyond which a parameter is not likely to be."""
+    """Rise of chi2 at the end of a step from which the parameter's value is unlikely."""
     far = abs(way.deviations) / END
     return END**2 + 2.0 * math.log(far) if far > 1.0 else FLAT * END**2
 
 
 def _followed(fit: Fit, way: _Way, pool: ThreadPoolExecutor | None) -> tuple[Array | None, Model | None]:
-    """How far all parameters (p,) get along a way until chi2 rises as it should, None where it does at once; or the model
-    where it falls."""
+    """Follow a step until chi2 has risen enough.
+
+    Returns the distance (p,) of all parameters there, None where the first step suffices; or the model where chi2 falls.
+    """
     rise, model = _again(fit, way, pool)
     if rise >= _enough(way):
         return None, None
@@ -147,7 +151,7 @@ def _distance(fit: Fit, model: Model) -> Array:
 
 
 def _moved(fit: Fit, way: _Way) -> Model | None:
-    """The model with one parameter moved, and with it the others; None where a bound is in the way."""
+    """The model with one parameter moved and the others following the covariance; None where a bound is in the way."""
     column = fit.covariance[:, way.place]
     values = fit.values + way.deviations * column / math.sqrt(column[way.place])
     bounds = [fit.model.parameters[name].bounds for name in fit.names]
@@ -158,8 +162,10 @@ def _moved(fit: Fit, way: _Way) -> Model | None:
 
 
 def _rises(fit: Fit, ways: Sequence[_Way], pool: ThreadPoolExecutor | None) -> list[float]:
-    """By how much chi2 rises along each way, less what small changes of initial states and other parameters can do about
-    it; infinite beyond a bound and where the model diverges."""
+    """Rise of chi2 along each step, to first order after refitting the initial states and the other parameters.
+
+    Infinite beyond a bound and where the model diverges.
+    """
     models = [_moved(fit, way) for way in ways]
     outputs = iter(fit.run.many([(model, fit.starts) for model in models if model is not None], pool))
     problem = Problem(fit.run, fit.names, fit.noise, pool)
@@ -187,14 +193,14 @@ def _rise(problem: Problem, fit: Fit, place: int, residuals: Sequence[Array]) ->
 
 
 def _within(fit: Fit, way: _Way) -> bool:
-    """Whether a way ends before its parameter's bound, and nearer than where it has lost all relation to its value."""
+    """Whether a step ends before its parameter's bound and within a meaningful multiple of the parameter's value."""
     far = abs(way.deviations) * math.sqrt(fit.covariance[way.place, way.place])
     near = far < BEYOND * abs(fit.values[way.place]) and abs(way.deviations) <= WIDEST
     return near and _moved(fit, way) is not None
 
 
 def _again(fit: Fit, way: _Way, pool: ThreadPoolExecutor | None) -> tuple[float, Model]:
-    """By how much chi2 rises along a way with the other parameters fitted again, and the model there."""
+    """Rise of chi2 at the end of a step after refitting the other parameters, and the model there."""
     model = _moved(fit, way)
     if model is None:
         return math.inf, fit.model
@@ -211,7 +217,7 @@ def _again(fit: Fit, way: _Way, pool: ThreadPoolExecutor | None) -> tuple[float,
 
 
 def _descended(found: Search, model: Model, pool: ThreadPoolExecutor | None) -> Search | None:
-    """The search with its fit descended anew from a model; None where that ends no lower."""
+    """The search refitted from a model; None where chi2 does not become lower."""
     fit = found.fit
     trial = replace(found.best, model=model, starts=fit.starts, converged=False, differences=None)
     try:
@@ -231,7 +237,7 @@ def settled_at(found: Search, fit: Fit) -> Search:
 
 
 def widened(fit: Fit, reach: Array) -> Fit:
-    """The fit with 95 % intervals of at least this half-width (p,); an undetermined parameter leaves the others alone."""
+    """The fit with 95 % intervals of at least the half-width `reach` (p,); an undetermined parameter becomes uncorrelated."""
     std = np.sqrt(np.diag(fit.covariance))
     factors = np.ones(len(std))
     known = (std > 0.0) & np.isfinite(std)

@@ -1,8 +1,8 @@
-"""Locate a mismatch without naming it: which quantity does the missing force (or sensor error) depend on?
+"""Locate a mismatch without naming it: on which quantity does the missing force (or sensor error) depend?
 
-Each free function is, to first order, another hypothesis: a free map beside the model. What it predicts of blocks that were left out tells
-where the mismatch lives, and whether the names leave something that another explanation would predict. It also draws what the
-catalogue has no name for.
+To first order each free function is another hypothesis: a free map beside the model. Its prediction of left-out blocks shows which
+quantity the mismatch depends on, and whether the names leave something that another explanation would predict. The map also
+draws laws that the catalogue lacks.
 """
 
 import math
@@ -22,16 +22,16 @@ from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.output_error import Fit, rerun
 
 Array = NDArray[np.float64]
-RIDGE = 1e-4  # prior precision of a coefficient, relative to the information that all rows have of it
+RIDGE = 1e-4  # prior precision of a coefficient, relative to its information in all rows
 
 
 @dataclass(frozen=True)
 class Dependence:
     """How much of the residual a free function of `quantity` explains.
 
-    `explained` is the share of the residual's sum of squares above the noise in blocks left out of the fit (at most 1, below 0
-    where it only fits noise). `grid` and `force` draw a function of one quantity; the unit is the model's force, or its
-    position for a sensor error. `found` are the errors of prediction.
+    `explained` is the share of the residual's sum of squares above the noise, in blocks left out of the fit (at most 1; below 0
+    where the function fits only noise). `grid` (g,) and `force` (g,) draw a function of one quantity, in the model's unit of force,
+    or of position for a sensor error. `found` holds the prediction errors.
     """
 
     quantity: str
@@ -43,11 +43,16 @@ class Dependence:
 
 @dataclass(frozen=True)
 class Reach:
-    """What parameters and the initial state do to whitened rows of one series that its fit does not see.
+    """Sensitivities of whitened rows of one series that its fit does not see.
 
-    Without it a free map would be predicted with parameters that were fitted without it. `parameters` (h, p), with the initial
-    state fitted again; `starts` (h, q), and (n, q) of the rows to which that is fitted as `seen`: those that the fit sees, or of a
-    separate held-out record all, which are the hidden ones, too.
+    Needed to predict a free map together with the parameters, which were fitted without it.
+
+    Parameters
+    ----------
+    parameters : (h, p) sensitivities of the h hidden rows to the parameters, after refitting the initial state.
+    starts : (h, q) sensitivities of the hidden rows to the initial state.
+    seen : (n, q) the same of the n rows to which the initial state is fitted: the rows that the fit sees, or for a separate
+        held-out record all of its rows, which are also the hidden ones.
     """
 
     parameters: Array
@@ -55,7 +60,7 @@ class Reach:
     seen: Array
 
     def refitted(self, seen: Array, hidden: Array) -> Array:
-        """What is left of changes of the hidden rows (h, k) once the initial state is fitted to those of the other ones (n, k)."""
+        """Changes of the hidden rows (h, k) after fitting the initial state to the changes of the seen rows (n, k)."""
         norms = np.linalg.norm(self.seen, axis=0)
         norms[norms == 0.0] = 1.0
         taken = np.linalg.lstsq(self.seen / norms, seen, rcond=1e-7)[0]
@@ -63,13 +68,12 @@ class Reach:
 
 
 def _parts(rows: Rows) -> list[tuple[Sequence[slice], Sequence[slice]]]:
-    """Stretches of each series, and of each separate held-out one after them: those to which its start is fitted, and hidden ones."""
+    """For each series, then each separate held-out one: the stretches to which its initial state is fitted, and the hidden ones."""
     return [*zip(rows.seen, rows.hidden, strict=True), *((parts, parts) for parts in rows.held)]
 
 
 def with_held_out(fit: Fit, rows: Rows) -> Fit:
-    """The fit with its runs over the separate held-out records beside those that it saw; the fit itself without any, or where it diverges
-    there."""
+    """The fit extended by its runs over the separate held-out records; unchanged without any, or where it diverges there."""
     beyond = rerun(fit.model, rows.unseen, rows.noise, fit.run.max_step)
     if beyond is None:
         return fit
@@ -82,7 +86,7 @@ def with_held_out(fit: Fit, rows: Rows) -> Fit:
 
 
 def reach_of(fit: Fit, rows: Rows, pool: ThreadPoolExecutor | None = None) -> list[Reach]:
-    """How the hidden rows of each series of the fit's run depend on its parameters and starts."""
+    """Sensitivities of the hidden rows of each series of the fit's run to its parameters and initial states."""
     model, (steps, state_steps) = fit.model, (fit.linearisation.steps, fit.linearisation.state_steps)
     moved = [model.with_values({name: model.value(name) + step}) for name, step in zip(fit.names, steps)]
     cases = [(one, fit.starts) for one in moved]
@@ -102,7 +106,7 @@ def reach_of(fit: Fit, rows: Rows, pool: ThreadPoolExecutor | None = None) -> li
 
 
 def following(base: Linearised, rows: Rows, reach: Sequence[Reach]) -> Linearised:
-    """The fit whose parameters reach the hidden rows, too, and those of separate held-out records as far as `reach` has them."""
+    """The linearised fit with the sensitivities of hidden rows, and of separate held-out rows as far as `reach` has them."""
     jacobian = base.jacobian.copy()
     hidden = np.concatenate([one.parameters for one in reach])
     jacobian[rows.fitted : rows.fitted + len(hidden)] = hidden
@@ -110,13 +114,13 @@ def following(base: Linearised, rows: Rows, reach: Sequence[Reach]) -> Linearise
 
 
 def beside(fit: Fit, base: Linearised, one: FreeMap, rows: Rows, reach: Sequence[Reach]) -> Linearised:
-    """The fit, which reaches the hidden rows, with a free map beside it, to first order."""
+    """The linearised fit, with its sensitivities of hidden rows, extended to first order by a free map."""
     known, count = base.jacobian.shape[1], len(one.columns)
     jacobian = np.zeros((len(base.residual), known + count))
     jacobian[:, :known] = base.jacobian
     added = jacobian[:, known:]
     bases = fit.linearisation.bases
-    first, below = 0, rows.fitted  # where the next seen rows, and the next hidden ones, go
+    first, below = 0, rows.fitted  # position of the next seen rows and of the next hidden ones
     for index, (series, parts) in enumerate(zip(fit.run.series, _parts(rows))):
         columns = np.column_stack([column[index] for column in one.columns])
         white, unseen = (series.whitened(rows.noise, columns, which) for which in parts)
@@ -135,7 +139,7 @@ def beside(fit: Fit, base: Linearised, one: FreeMap, rows: Rows, reach: Sequence
 
 
 def dependences(known: Trajectories, rows: Rows, pool: ThreadPoolExecutor | None = None) -> list[Dependence]:
-    """Dependence of what a fit leaves on each quantity, the one that predicts best first."""
+    """Dependence of a fit's residual on each quantity, the one that predicts best first."""
     fit = with_held_out(known.fit, rows)
     if fit is not known.fit:
         known = trajectories(fit)
@@ -150,7 +154,7 @@ def dependences(known: Trajectories, rows: Rows, pool: ThreadPoolExecutor | None
         give_back()
         wide, count = beside(fit, base, one, rows, reach), len(one.columns)
         quantity, grid, basis = one.quantity, one.grid, one.basis
-        del one  # its columns, which are large over long records, stand in `wide` now
+        del one  # its columns, which are large for long records, are now in `wide`
         predicted = cross_validate(wide, rows.blocks)
         coefficients = _coefficients(wide, rows.fitted)[-count:]
         del wide

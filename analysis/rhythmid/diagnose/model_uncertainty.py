@@ -1,8 +1,9 @@
-"""How much a parameter's value depends on which explanation it belongs to.
+"""Dependence of a parameter's value on the explanation to which it belongs.
 
-A fit's covariance takes its model for true. A small effect that the model lacks, or a rival of one that it has, moves the other parameters
-by more than the noise does. The law of total variance adds to the covariance within a model that between models, each with the
-weight of what it predicts of unseen data (J. A. Hoeting, D. Madigan, A. E. Raftery, C. T. Volinsky, Statist. Sci. 14 (1999) 382).
+A fit's covariance assumes that its model is true. A small effect that the model lacks, or a rival of one that it has, moves the other
+parameters by more than the noise does. By the law of total variance the covariance between models is added to that within a model.
+Each model is weighted by its prediction of unseen data
+(J. A. Hoeting, D. Madigan, A. E. Raftery, C. T. Volinsky, Statist. Sci. 14 (1999) 382).
 """
 
 from collections.abc import Sequence
@@ -16,13 +17,13 @@ Array = NDArray[np.float64]
 
 
 def covariance_between(names: Sequence[str], chosen: Hypothesis, hypotheses: Sequence[Hypothesis]) -> Array:
-    """Mean product of the departures of parameters from their values in the chosen hypothesis, over all that have them.
+    """Weighted mean product of the parameters' deviations from the chosen hypothesis, over all hypotheses that have them.
 
     Parameters
     ----------
-    names : p parameters; those that the chosen hypothesis does not estimate depart by nothing.
-    chosen : the hypothesis whose values are told.
-    hypotheses : all of them, weighted by their predictive densities.
+    names : p parameters; the deviation of one that the chosen hypothesis does not estimate is zero.
+    chosen : the hypothesis whose values are reported.
+    hypotheses : all hypotheses, weighted by their predictive densities.
 
     Returns
     -------

@@ -1,9 +1,9 @@
-"""Probabilities of names: how much of the evidence is for hypotheses that hold them.
+"""Probabilities of names: the share of the evidence held by hypotheses that contain them.
 
-Hypotheses with no more effects than the chosen one share the evidence, as pseudo-BMA weights. A name's probability is the
-share of those that hold it, times the chance that the catalogue holds the truth at all. That falls with how much is left that
-something else explains, beside the part of the mismatch that the name explains; and with how little the records determine the effect's
-size: where an effect improves the prediction by much, whatever its size is, it does so in a limit that other laws have as well.
+Hypotheses with no more effects than the chosen one share the evidence, as pseudo-BMA weights. A name's probability is the share of
+those that contain it, times the chance that the catalogue holds the truth at all. That chance falls with the unexplained part that
+something else explains, relative to the part that the name explains. It also falls if the records do not determine the effect's size:
+an effect that improves the prediction whatever its size does so at a limit of its law, which other laws share.
 """
 
 import math
@@ -28,7 +28,7 @@ from rhythmid.diagnose.selection import Contest, Selection, beside_small_effects
 
 
 def weights_of(contest: Contest, selection: Selection) -> dict[tuple[str, ...], float]:
-    """Weight of each hypothesis, by its key, among those with no more effects than the chosen one."""
+    """Weight of each hypothesis, by key, among those with no more effects than the chosen one."""
     chosen = selection.chosen
     sound = [one for one in contest.hypotheses if keeps_shape(one.shape)]
     rivals = [one for one in sound if len(one.elements) <= len(chosen.elements)]
@@ -37,17 +37,19 @@ def weights_of(contest: Contest, selection: Selection) -> dict[tuple[str, ...], 
 
 
 def adequacy(explained: float) -> float:
-    """Chance that names which explain this share of what anything explains are the true ones.
+    """Chance that names are the true ones if they explain this share of the explainable mismatch.
 
-    A logistic function of the logarithm of what they leave.
+    A logistic function of the logarithm of the unexplained share.
     """
     left = min(max(1.0 - explained, 1e-9), 1.0)
     return float(HOLDS / (1.0 + (left / ADEQUATE) ** STEEPNESS))
 
 
 def resolved(error: float) -> float:
-    """Chance that an effect is not only a limit of its law, where its size has this standard deviation relative to itself: from one down
-    to `OPEN` by a logistic function of its logarithm."""
+    """Chance that an effect is not only a limit of its law, given the relative standard deviation of its size.
+
+    A logistic function of the logarithm of `error`, falling from one to `OPEN`.
+    """
     known = 1.0 / (1.0 + (error / VAGUE) ** VAGUENESS) if error < math.inf else 0.0
     return float(OPEN + (1.0 - OPEN) * known)
 
@@ -55,9 +57,9 @@ def resolved(error: float) -> float:
 def joint_probability(
     names: Sequence[str], contest: Contest, chosen: Hypothesis, weights: dict[tuple[str, ...], float]
 ) -> float:
-    """Share of the evidence for hypotheses that hold all these names of the chosen one.
+    """Share of the evidence held by hypotheses that contain all these names of the chosen one.
 
-    A richer law that contains a name holds it, too: were it clearly better, it would have been chosen.
+    A richer law that contains a named one counts, too: if it were clearly better, it would have been chosen.
     """
     accepted = [({name, *chosen.richer.get(name, ())}, names.count(name)) for name in dict.fromkeys(names)]
     held = [
@@ -69,13 +71,20 @@ def joint_probability(
 
 
 def prior_odds(family: str) -> float:
-    """Prior odds of a family on real machines, over those with which the proof draws it; those of an element without a family are one."""
+    """Prior odds of a family on real machines relative to the proof; one for an element without a family."""
     return PRIOR_ODDS.get(family, PRIOR_ODDS_OF_OTHERS) if family else 1.0
 
 
 def chance_of_law(share: float, left: float, size_error: float = 0.0, family: str = "") -> float:
-    """Chance that an effect with this share of the mismatch is the law that its name says, where this much is left: of the part of the mismatch
-    that it is to explain, what is left may be a part. The odds of that are those of the proof times the prior odds of its family."""
+    """Chance that an effect is the law that its name says.
+
+    Parameters
+    ----------
+    share, left : shares of the mismatch that the effect explains and that is left. The remainder may belong to the part of the
+        mismatch that the effect should explain.
+    size_error : relative standard deviation of the effect's size.
+    family : its family, whose prior odds multiply the odds found in the proof.
+    """
     own = share / (share + left) if share + left > 0.0 else 0.0
     chance = adequacy(own) * resolved(size_error)
     odds = prior_odds(family)
@@ -83,8 +92,10 @@ def chance_of_law(share: float, left: float, size_error: float = 0.0, family: st
 
 
 def removed_by(some: Sequence[str], chosen: Hypothesis, contest: Contest) -> float:
-    """Share of the mismatch that these effects of a hypothesis remove beside its others. Laws that are hardly true remove what a law that
-    is not known does. None where the model without them was not fitted."""
+    """Share of the mismatch that some effects of a hypothesis remove beside its others; 0 where the model without them was not fitted.
+
+    Laws that are unlikely to be true remove a part that belongs to an unknown law.
+    """
     whole = contest.nominal.prediction.mean_square - contest.floor
     others = set(chosen.elements) - set(some)
     without = [one.prediction.mean_square for one in contest.hypotheses if set(one.elements) == others]

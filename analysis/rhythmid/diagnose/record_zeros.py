@@ -1,11 +1,11 @@
-"""Zeros that differ from record to record: whether the records have them, and the calibration with them.
+"""Zeros that differ from record to record: whether the records need them, and the calibration with them.
 
-A zero of each record is a hypothesis like any other. It is not missing physics, and what it can do, physics can do as well:
-the mean of a motion shifts with its amplitude where a stiffness is not symmetric. So it is adopted, for all hypotheses alike, where
-it predicts data that the fit has not seen decisively better, both beside the nominal model and beside the effect of the catalogue that
-explains the records best, and where with both the machine is followed: a zero is a calibration, and does not stand for a machine that
-has changed from record to record. The output is linear in its zeros, so that beside the nominal model cross-validation to first order is
-exact in them; beside the effect both are fitted together.
+A zero of each record is a hypothesis like any other. It is not missing physics, but physics can imitate it: with an asymmetric
+stiffness, the mean of a motion shifts with its amplitude. The zeros are therefore adopted, for all hypotheses alike, only if they
+predict data that the fit has not seen decisively better, both beside the nominal model and beside the effect of the catalogue that
+explains the records best. The model with both must also follow the machine: a zero is a calibration, and must not compensate for a
+machine that has changed from record to record. The output is linear in its zeros, so that beside the nominal model first-order
+cross-validation is exact in them. Beside the effect, both are fitted together.
 """
 
 import math
@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class _Seen:
-    """A fit under white noise, and what its predictions are made from."""
+    """A fit under white noise, with the data for its predictions."""
 
     fit: Fit
     rows: Rows
@@ -50,7 +50,7 @@ class _Seen:
 
     @classmethod
     def of(cls, fit: Fit, pool: ThreadPoolExecutor | None) -> "_Seen":
-        """White, because what is missing is no noise: whitened as such, a constant would hardly be left."""
+        """Assume white noise: the missing part is not noise, and whitening it would remove most of a constant."""
         left = np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series, strict=True)])
         noise = NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
         fit = under(fit, noise, pool)
@@ -59,7 +59,7 @@ class _Seen:
         return cls(fit, rows, reach, following(linearised(fit, rows), rows, reach))
 
     def with_zeros(self) -> Linearised:
-        """The fit with a zero of each record but the first beside it."""
+        """The linearised fit with a zero of each record but the first."""
         series = self.fit.run.series
         names = tuple(dict.fromkeys(record_of(one) for one in series))[1:]
         columns = tuple(
@@ -68,8 +68,10 @@ class _Seen:
         return beside(self.fit, self.base, FreeMap("zero", columns), self.rows, self.reach)
 
     def refitted(self, pool: ThreadPoolExecutor | None) -> Linearised | None:
-        """The fit with a zero of each record, everything fitted again: an effect that was fitted without them is far from where it is with
-        them. None where that fails."""
+        """The fit with a zero of each record, all parameters refitted; None where that fails.
+
+        The refit is needed because an effect fitted without the zeros is far from its best values with them.
+        """
         try:
             free = estimate(
                 with_record_zero(self.fit.model),
@@ -83,12 +85,14 @@ class _Seen:
 
 
 def _told(seen: _Seen, with_zeros: Linearised | None, most: float = math.inf) -> bool:
-    """Whether zeros predict unseen data decisively better than the fit alone, and by a practical size; with an error of `most` at
-    the most, as a share of the motion."""
+    """Whether zeros predict unseen data decisively better than the fit alone.
+
+    The gain must have a practical size, and the error with the zeros must be at most `most`, as a share of the motion.
+    """
     if with_zeros is None:
         return False
     found = predict([with_zeros, seen.base], seen.rows.blocks, seen.rows.record)
-    size = seen.rows.size / seen.rows.noise.std  # errors are in units of the noise
+    size = seen.rows.size / seen.rows.noise.std  # converted to units of the noise, as the errors
     removed = found[1].mean_square - found[0].mean_square
     decided = weight_for(found[0], found[1]) > decisive(1) and removed > (PRACTICAL * size) ** 2
     return decided and found[0].mean_square < (most * size) ** 2
@@ -102,9 +106,10 @@ def with_zeros(
     pool: ThreadPoolExecutor | None = None,
     tell: Tell = lambda _: None,
 ) -> tuple[Calibration, list[Series]]:
-    """The calibration of the model `given`, and held-out series, with a zero of each record where the records have them.
+    """The calibration of the model `given` and the held-out series, with a zero of each record if the records need them.
 
-    The series are moved by the zeros, so that sizes and first guesses are those of one machine; what is left of the zeros stays free.
+    The zeros are subtracted from the series, so that scales and first guesses are those of one machine; the small remaining
+    zeros stay free parameters.
     """
     fit, series, kept = calibration.fit, calibration.series, (calibration, list(unseen))
     if len({record_of(one) for one in series}) < 2 or series[0].measured != "position":
@@ -134,7 +139,7 @@ def _moved_by(one: Series, zeros: Mapping[str, float]) -> Series:
 
 
 def _of_unseen(one: Series, fit: Fit, zeros: Mapping[str, float]) -> Series:
-    """A held-out series: the hidden end of a record has its zero, a separate record one of its own."""
+    """A held-out series without its zero: that of its record for a hidden end, a newly estimated one for a separate record."""
     if any(record_of(other) == record_of(one) for other in fit.run.series):
         return _moved_by(one, zeros)
     one = moved(one, 0.0)

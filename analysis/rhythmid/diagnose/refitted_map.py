@@ -1,9 +1,9 @@
-"""A free map refitted beside the nominal model: what one unknown law of one quantity would predict.
+"""A free map refitted beside the nominal model: the prediction of one unknown law of one quantity.
 
-The maps of location.py are changes to first order at a fit. Where what is missing is large, or where names have bent the model's
-own parameters in order to stand in for it, they understate what another law would predict. The map of the quantity on which the
-nominal model's residual depends most is therefore fitted like any other model. What it predicts is a measure of what the names
-leave; it is no name itself.
+The maps of location.py are first-order changes at a fit. They understate what another law would predict where the missing effect is
+large, or where named effects have biased the model's own parameters to compensate for it. The map of the quantity on which the
+nominal model's residual depends most is therefore fitted like any other model. Its prediction measures what the names leave
+unexplained; the map itself is not a name.
 """
 
 from collections.abc import Sequence
@@ -28,10 +28,17 @@ def refitted_map(
     rows: Rows,
     step: float,
 ) -> tuple[str, Contender] | None:
-    """The free map on whose quantity the nominal model's residual depends most, fitted beside it; and that quantity.
+    """Fit the free map of the quantity on which the nominal model's residual depends most.
 
-    `before` are the dependences at the nominal fit, `known` is its run. None where no free function of one quantity predicts
-    anything, or the model diverges with it.
+    Parameters
+    ----------
+    nominal : the fitted nominal model.
+    before : dependences of its residual on each quantity.
+    known : its run.
+    series, rows, step : the fitted series, the scored rows, and the largest integration step [s].
+
+    Returns the quantity and the fitted model, or None where no free function of one quantity predicts anything or the model
+    diverges with it.
     """
     best = max(
         (one for one in before if one.quantity in SPLINED), key=lambda one: one.explained, default=None

@@ -1,7 +1,7 @@
-"""Rejections: every reason for which a hypothesis is not believed, one row each of one table.
+"""Rejections: all reasons for not believing a hypothesis, one row each of one table.
 
-A row has a statistic, and rejects where that is below its threshold. Rows are evaluated for every hypothesis; all that reject are
-told. `python -m rhythmid.diagnose.rejections` prints the table as Markdown.
+A row has a statistic, and rejects where the statistic is below its threshold. All rows are evaluated for every hypothesis, and all
+rejections are reported. `python -m rhythmid.diagnose.rejections` prints the table as Markdown.
 """
 
 import math
@@ -29,19 +29,19 @@ from rhythmid.diagnose.hypothesis import Hypothesis, special_case
 
 @dataclass(frozen=True)
 class Claim:
-    """A hypothesis, and what it has to be better than.
+    """A hypothesis, and the hypotheses with which it is compared.
 
     Parameters
     ----------
-    hypothesis : what is claimed.
-    without : the hypothesis with one effect less that predicts best; kin compete for one place, so it need not be a part of
-        this one.
+    hypothesis : the hypothesis.
+    without : the hypothesis with one effect less that predicts best. Related laws compete for one place, so it need not be a
+        part of this one.
     nominal : the refitted nominal model.
     floor : mean squared error of the best prediction of all, free maps included.
-    candidates : number of effects that were looked at for this place.
-    size : rms of what errors are a share of.
-    practical : share of `size` below which an effect is of no practical matter.
-    simpler : a simpler hypothesis with as many effects, or one that this one contains, whose place it would take.
+    candidates : number of effects tried for this place.
+    size : rms of the signal that errors are a share of.
+    practical : share of `size` below which an effect has no practical importance.
+    simpler : a simpler hypothesis with as many effects, or one that this one contains, which it would replace.
     """
 
     hypothesis: Hypothesis
@@ -63,7 +63,7 @@ class Claim:
 class Rule:
     """One row: it rejects a claim whose `statistic` is below its `threshold`.
 
-    `reason` says why, all reasons where there are several; which of them is true of a claim is then what `why` says.
+    `reason` states why. Where there are several possible reasons it lists all of them, and `why` gives the one for a claim.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Rule:
     why: Callable[[Claim], str] | None = None
 
     def reason_for(self, claim: Claim) -> str:
-        """Why it rejects this claim."""
+        """The reason for which this claim is rejected."""
         return self.reason if self.why is None else self.why(claim)
 
 
@@ -90,7 +90,7 @@ class Rejection:
 
 
 def decisive(candidates: int) -> float:
-    """Logarithm of the odds that the best of so many candidates has to have."""
+    """Logarithm of the odds that the best of so many candidates needs."""
     return math.log(max(candidates, 1) / FALSE_ALARM)
 
 
@@ -121,7 +121,7 @@ def _needed_of_mismatch(claim: Claim) -> float:
     return RICHER if richer else MISMATCH
 
 
-# least statistics of the fitted effects themselves: a hypothesis that falls short of one is no rival of any other
+# lower limits of statistics of the fitted effects themselves; a hypothesis below one of them does not compete
 SHAPES: Mapping[str, float] = {
     "within_bounds": EDGE,
     "acts_within_records": EDGE,
@@ -133,7 +133,7 @@ SHAPES: Mapping[str, float] = {
 
 
 def keeps_shape(shape: Mapping[str, float]) -> bool:
-    """Whether effects with these statistics still are what their names say."""
+    """Whether effects with these statistics still act as their names say."""
     return all(shape.get(name, math.inf) >= least for name, least in SHAPES.items())
 
 
@@ -154,12 +154,12 @@ INSTEAD = "other effects, one fewer, predict as well"
 
 
 def _why_no_better(claim: Claim) -> str:
-    """What makes the weight of evidence too small: a rival, blocks that count against it, too few blocks for it, or chance."""
+    """The reason for too little evidence: a rival, blocks with contrary evidence, too few blocks, or chance."""
     needed = decisive(claim.candidates)
     gain = claim.hypothesis.prediction.log_density - claim.without.prediction.log_density
     if not set(claim.without.elements) <= set(claim.hypothesis.elements) and gain.sum() < needed:
         return INSTEAD
-    # chance takes no such share off all that is left, noise included
+    # a chance gain does not remove this share of the whole error, noise included
     large = claim.removed >= REST * claim.without.prediction.mean_square
     if large or gain.sum() >= needed:
         for_it = float(np.clip(gain, 0.0, math.log(BLOCK_ODDS)).sum())
@@ -249,7 +249,7 @@ RULES: tuple[Rule, ...] = (
 
 
 def rejections_of(claim: Claim, rules: Sequence[Rule] = RULES) -> list[Rejection]:
-    """The rows that reject a claim, in the table's order."""
+    """The rules that reject a claim, in the table's order."""
     found = []
     for rule in rules:
         statistic, threshold = rule.statistic(claim), rule.threshold(claim)
@@ -259,7 +259,7 @@ def rejections_of(claim: Claim, rules: Sequence[Rule] = RULES) -> list[Rejection
     return found
 
 
-# rows that a hypothesis has to pass to take the place of a simpler one, and of one that it contains
+# rules that a hypothesis must pass to replace a simpler one, and to replace one that it contains
 OVER_SIMPLER = tuple(rule for rule in RULES if rule.name == "beats_simpler")
 OVER_CONTAINED = tuple(
     rule for rule in RULES if rule.name in ("beats_simpler", "share_of_rest", "share_of_mismatch")
@@ -267,8 +267,11 @@ OVER_CONTAINED = tuple(
 
 
 def replaces(claim: Claim) -> bool:
-    """Whether a richer law is named in the place of one that it contains, `claim.without` and `claim.simpler`: it predicts
-    better, and removes more than small effects do of what the other leaves above the floor and of the whole mismatch."""
+    """Whether a richer law replaces one that it contains, given as `claim.without` and `claim.simpler`.
+
+    It must predict better. Of the simpler law's remainder above the floor, and of the whole mismatch, it must remove more than
+    small effects do.
+    """
     return not rejections_of(claim, OVER_CONTAINED)
 
 

@@ -1,6 +1,6 @@
-"""Replay: the evidence of a diagnosis as plain data, from which the decision is made again without simulating.
+"""Replay: the evidence of a diagnosis as plain data, from which the decision is repeated without simulation.
 
-A change of the rules, or of the constants, is tried on answers that were kept.
+This allows changes of the rules or of the constants to be tried on stored answers.
 """
 
 import math
@@ -14,11 +14,11 @@ from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.selection import Contest, select
 from rhythmid.diagnose.verdict import Decision, decide
 
-DIGITS = 8  # significant, of each number of the ledger
+DIGITS = 8  # significant digits of each number in the ledger
 
 
 def ledger(contest: Contest, detectable: float, size_errors: Mapping[str, float]) -> dict[str, Any]:
-    """All that a decision depends on, as plain JSON data."""
+    """All data that a decision depends on, as plain JSON data."""
     return {
         "hypotheses": [
             {
@@ -96,16 +96,16 @@ def contest_of(data: dict[str, Any]) -> Contest:
 
 
 def decision_of(data: dict[str, Any]) -> Decision:
-    """The decision on a ledger by the rules as they are now."""
+    """The decision on a ledger by the current rules."""
     contest = contest_of(data)
     errors = {label: math.inf if one is None else one for label, one in data.get("size_errors", {}).items()}
     return decide(contest, select(contest), data["detectable"], errors)
 
 
 def redecide(answer: dict[str, Any]) -> dict[str, Any]:
-    """An answer with the verdict, names and probabilities that its kept evidence gives by the rules as they are now.
+    """A stored answer with the verdict, names and probabilities that the current rules give for its evidence.
 
-    Effects that are named now and were not before have no parameters: the fit of another model was kept.
+    Newly named effects have no parameters, because the fit of another model was stored.
     """
     if "evidence" not in answer:
         return answer

@@ -1,8 +1,8 @@
-"""How motion is scored: in free run where that means something, else in windows.
+"""Choose how motion is scored: in free run where that is meaningful, otherwise in windows.
 
-A free run means nothing where the machine integrates, or where the nominal model loses it altogether: a score along a
-trajectory that the machine never took says nothing of what the model lacks. Windows with starts of their own are made shorter
-until the model follows the machine through them. (Recorded effort is scored by inverse dynamics, see `effort`.)
+A free run is not meaningful where the machine integrates, or where the nominal model does not follow it at all: a score along a
+trajectory that the machine never took does not show what the model lacks. Windows with initial states of their own are then
+shortened until the model follows the machine through them. (Recorded effort is scored by inverse dynamics, see `effort`.)
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -25,7 +25,7 @@ from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 
-SHORTER = 2.0  # factor from one length of windows to the next
+SHORTER = 2.0  # ratio of successive window lengths
 INTEGRATES = (
     "the model integrates or is unstable, so that a long free run would add up every small disturbance"
 )
@@ -44,8 +44,11 @@ DISTURBED_FREE_RUN = (
 
 @dataclass(frozen=True)
 class Scoring:
-    """The calibrated nominal model, `unseen` held-out series where they are separate ones, and how all is scored: in free run or
-    in windows, of what length and why. The reason tells of the records of the fit; what is held out is judged by its own."""
+    """The calibrated nominal model and the scoring mode.
+
+    `unseen` are held-out series, separate or tails. `kind` and `reason` state the mode, the length of windows and why. The
+    reason refers to the fitted records; held-out data are judged by errors of their own.
+    """
 
     calibration: Calibration
     unseen: tuple[Series, ...]
@@ -54,7 +57,7 @@ class Scoring:
 
     @property
     def error(self) -> float:
-        """rms of the residuals that the calibrated model leaves, in the output's unit."""
+        """Rms of the calibrated model's residuals, in the output's unit."""
         fit = self.calibration.fit
         left = [residual[one.used] for residual, one in zip(fit.residuals, fit.run.series)]
         return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
@@ -71,11 +74,12 @@ def settle(
 ) -> tuple[Scoring, ...]:
     """Calibrate the nominal model in the longest runs through which it follows the machine, in free run or in windows.
 
-    The first result is the way to score. Where it is not the free run, but a free run is not hopeless, that comes second, for
-    what the first leaves without a name: windows hide what is slow, and lines that are narrower than a window resolves. Where
-    the machine integrates or is unstable, a free run comes second if it follows the machine all the same.
-    Without `windows` only a free run that follows the machine is a result, else there is none.
-    Without `separate` held-out series the last fifth of every run is held out. Raises InputError when no length works.
+    The first result is the scoring mode. If it is windows, a free run that is not hopeless is the second result, for effects that
+    windows leave unnamed: windows hide slow effects, and spectral lines narrower than their resolution. If the machine integrates
+    or is unstable, a free run is the second result only if it follows the machine. Without `windows`, the only possible result is a
+    free run that follows the machine. Without `separate` held-out series the last fifth of every run is held out.
+
+    Raises InputError when no length works.
     """
     tried: list[Scoring] = []
     idle = 0
@@ -103,13 +107,13 @@ def settle(
     if not tried:
         assert failure is not None
         raise failure
-    # the shorter a window, the less the machine moves in it: what the model leaves has to be a smaller share of that, too
+    # the machine moves less in a shorter window, so the error must also decrease as a share of that motion
     longest, best = tried[0], min(tried, key=lambda one: one.calibration.fit.nrmse())
     if longest.kind != "free_run":
         chosen = longest if best.error >= BETTER_TOGETHER * longest.error else best
         if time_is_up():
             return (chosen,)
-        # no window shows what is slow
+        # windows do not show slow effects
         free = _Way("free_run", DISTURBED_FREE_RUN, list)
         try:
             disturbed = _scored(free, model, series, separate, catalogue, pool, tell)
@@ -125,7 +129,7 @@ def settle(
 
 @dataclass(frozen=True)
 class _Way:
-    """A way to score with its reason, and what it makes `of` series."""
+    """A scoring mode with its reason, and the function `of` that cuts series for it."""
 
     kind: ScoringKind
     reason: str
@@ -136,12 +140,12 @@ def _scored(
     how: _Way, model: Model, series: Sequence[Series], separate: Sequence[Series], catalogue: Catalogue,
     pool: ThreadPoolExecutor | None, tell: Tell,
 ) -> Scoring:  # fmt: skip
-    """The nominal model calibrated in one way to score. Raises InputError where that fails."""
+    """Calibrate the nominal model in one scoring mode. Raises InputError where that fails."""
     cut, unseen = how.of(series), how.of(separate)
     if not separate:
         cut, unseen = hold_out_tail(cut)
     calibration = calibrate(model, cut, catalogue, pool, tell)
-    if how.kind == "free_run":  # windows have starts of their own, which take up most of a zero
+    if how.kind == "free_run":  # the initial states of windows would absorb most of a zero
         calibration, unseen = with_zeros(calibration, model, unseen, catalogue, pool, tell)
     if calibration.reconstructed:
         unseen = [reconstructed(one) for one in unseen]
@@ -149,7 +153,7 @@ def _scored(
 
 
 def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
-    """Ways to try: the longest runs first."""
+    """Scoring modes to try, the longest runs first."""
     try:
         free = forgets(model, series)
     except InputError:

@@ -1,8 +1,8 @@
-"""Selection: from all hypotheses the one that an answer may stand by, and what is said against the others.
+"""Selection: choose the hypothesis on which an answer is based, and collect the rejections of the others.
 
-Effects are granted one place after the other. For each place all hypotheses with as many effects compete, whatever their
-effects are, so that kin (friction laws, stiffness laws, lags) compete before they may stand together; the place is granted
-where no row of the table of rejections speaks against the best of them.
+Effects are accepted one place after the other. For each place all hypotheses with as many effects compete, whatever their effects
+are. Related laws (friction laws, stiffness laws, lags) therefore compete before they may stand together. An effect is accepted
+where no rule of the table of rejections rejects the best of them.
 """
 
 import math
@@ -31,19 +31,19 @@ class Contest:
     Parameters
     ----------
     hypotheses : the nominal model first; effects, freed values, delays and other locations.
-    maps : free maps, by the quantity that they depend on.
-    candidates : number of effects that were looked at for each place.
-    size : rms of what errors are a share of.
-    practical : share of it below which an effect is of no practical matter.
-    ruled_out : hypotheses that the search has set aside because of their shape. They are rejected like others, and what they
-        predict is no measure for anything.
-    follows : error on held-out data, as a share of `size`, up to which a model follows the machine; infinite for an effort, whose noise
-        may be as large.
+    maps : predictions of free maps, by the quantity that they depend on.
+    candidates : number of effects tried for each place.
+    size : rms of the signal that errors are a share of.
+    practical : share of it below which an effect has no practical importance.
+    ruled_out : hypotheses that the search has discarded because of their shape. They are rejected like others, and their
+        predictions are not used for comparison.
+    follows : error on held-out data, as a share of `size`, up to which a model follows the machine; infinite for an effort, whose
+        noise may be as large.
     cut_short : whether the budget ended the search before all effects that scored well were tried.
-    structured : share of the error of the nominal model that follows from its own past, so that it is no noise; 0 of an effort, whose noise
-        the filter of the balance colours.
-    structured_after : the same of the model with which the search ended; of an effort that of the chosen one, what lasts longer than the
-        filter mixes neighbours.
+    structured : share of the nominal model's error that is predictable from its own past, hence not noise; 0 for an effort,
+        whose noise is coloured by the filter of the balance.
+    structured_after : the same for the model with which the search ended; for an effort, the share of the chosen model's error
+        that lasts longer than the filter mixes neighbours.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -69,12 +69,12 @@ class Contest:
         return min(one.mean_square for one in (*every, *self.maps.values()))
 
     def of_size(self, count: int) -> list[Hypothesis]:
-        """Hypotheses with so many effects, the one that predicts best first."""
+        """Hypotheses with this number of effects, the best prediction first."""
         found = [one for one in (*self.hypotheses, *self.ruled_out) if len(one.elements) == count]
         return sorted(found, key=lambda one: (-one.prediction.score, one.key))
 
     def claim(self, hypothesis: Hypothesis, without: Hypothesis, simpler: Hypothesis | None = None) -> Claim:
-        """A hypothesis and what it has to be better than."""
+        """A hypothesis together with those with which it is compared."""
         return Claim(
             hypothesis,
             without,
@@ -96,10 +96,10 @@ class Selection:
 
 
 def select(contest: Contest) -> Selection:
-    """Grant effects their places. Hypotheses whose effects have lost their shape take no part.
+    """Accept effects one by one. Hypotheses whose effects do not keep their shape do not compete.
 
-    Where one effect alone is refused, two together may still be granted, if they predict better than the best one alone: of
-    two that mask one another neither does much by itself.
+    Where a single effect is rejected, two together may still be accepted if they predict better than the best single one: two
+    effects that mask one another contribute little separately.
     """
     told: list[Rejection] = []
     chosen = smaller = contest.nominal
@@ -119,14 +119,14 @@ def select(contest: Contest) -> Selection:
             chosen = smaller = _simplest(granted)
             told += _beaten(smaller, granted, contest)
         else:
-            # rounding decides nothing
+            # a difference of rounding must not decide
             smaller = max(smaller, sound[0], key=lambda one: round(one.prediction.score, 6))
     chosen = _beside_others(chosen, contest, {row.hypothesis for row in told})
     return Selection(chosen, tuple(told))
 
 
 def _beside_others(chosen: Hypothesis, contest: Contest, refused: Collection[tuple[str, ...]]) -> Hypothesis:
-    """The chosen hypothesis, or the kin of it that is decisively better where both have the same further effects."""
+    """The chosen hypothesis, or a related one that is decisively better where both have the same further effects."""
     sound = [one for one in contest.hypotheses if keeps_shape(one.shape)]
     rivals = [(one, beside_small_effects(one, chosen, sound)) for one in sound if one.elements not in refused]
     weights = [
@@ -139,11 +139,11 @@ def _beside_others(chosen: Hypothesis, contest: Contest, refused: Collection[tup
 
 
 def beside_small_effects(rival: Hypothesis, chosen: Hypothesis, sound: Sequence[Hypothesis]) -> Hypothesis:
-    """A rival that predicts as much better than the chosen hypothesis as it does where both have the same further effects.
+    """A rival whose difference to the chosen hypothesis is that of the two with the same further effects.
 
-    Of laws of one family the wrong one may do better alone: it takes on a part of small effects that are too small to be named. The
-    further effects are those with which either of the two predicts best, among the `sound` hypotheses. Without any the rival is as it
-    is, and so is one that is no kin, or whose law contains the other one's.
+    The wrong law of a family may predict better alone, because it absorbs part of small effects that are too small to be named.
+    The further effects are those with which either of the two predicts best, among the `sound` hypotheses. The rival is
+    returned unchanged where there are none, where it is not of the same families, or where one law contains the other.
     """
     kin = sorted(rival.family.values()) == sorted(chosen.family.values())
     if rival is chosen or not kin or special_case(rival, chosen) or special_case(chosen, rival):
@@ -162,7 +162,7 @@ def beside_small_effects(rival: Hypothesis, chosen: Hypothesis, sound: Sequence[
 
 
 def _further(one: Hypothesis, sound: Sequence[Hypothesis]) -> list[tuple[Hypothesis, frozenset[str]]]:
-    """Hypotheses that predict better than this one with more effects, with those that they have beside it."""
+    """Hypotheses that contain this one and predict better, each with its further effects."""
     own = set(one.elements)
     return [
         (more, frozenset(more.elements) - own)
@@ -174,13 +174,13 @@ def _further(one: Hypothesis, sound: Sequence[Hypothesis]) -> list[tuple[Hypothe
 
 
 def _simplest(close: Sequence[Hypothesis]) -> Hypothesis:
-    """Of hypotheses that predict about as well, one that no other is a special case of, with the fewest free parameters."""
+    """The hypothesis with the fewest free parameters among equally good ones of which no other one is a special case."""
     plain = [one for one in close if not any(special_case(other, one) for other in close)]
     return min(plain or close, key=lambda one: (one.free, -_basic(one), -one.prediction.score, one.key))
 
 
 def _beaten(chosen: Hypothesis, granted: Sequence[Hypothesis], contest: Contest) -> list[Rejection]:
-    """What is said against hypotheses in whose place a simpler one is chosen, which predicts about as well."""
+    """Rejections of hypotheses for which a simpler one with about the same prediction is chosen."""
     found: list[Rejection] = []
     for one in granted:
         if special_case(chosen, one):
@@ -191,16 +191,16 @@ def _beaten(chosen: Hypothesis, granted: Sequence[Hypothesis], contest: Contest)
 
 
 def _basic(one: Hypothesis) -> int:
-    """How many richer laws contain the hypothesis' effects: the more, the more basic they are."""
+    """Number of richer laws that contain the hypothesis' effects: the larger, the more basic they are."""
     return sum(len(richer) for richer in one.richer.values())
 
 
 def equivalent(other: Hypothesis, best: Hypothesis, contest: Contest) -> bool:
-    """Whether another hypothesis predicts as well as the better one: the data do not decide, or the better one is a richer law that
-    does not replace it.
+    """Whether another hypothesis predicts as well as the better one.
 
-    What leaves more of the mismatch than a law may that stands for a richer one does not, although it predicts more blocks better: an end
-    stop acts in few of them.
+    The data do not separate them, or the better one is a richer law that does not replace the other. The other is not equivalent
+    if it leaves significantly more of the mismatch than a simpler law may, even if it predicts more blocks better: an end
+    stop, for example, acts in few blocks.
     """
     if special_case(other, best):
         return not replaces(contest.claim(best, other, other))

@@ -1,9 +1,9 @@
-"""Shape of a fitted effect: whether it still is what its name says.
+"""Shape of a fitted effect: whether it still acts as its name says.
 
-One that bends only where the motion has never been, such as a gap whose edges it never meets, is but a constant or a
-spring; one at the edge of what its name means is on its way to being another; and a disturbance, or a resonance as
-narrow as one, at a multiple of the forcing's frequency is what any change in the path of the forcing looks like, and one at the frequency of a
-free motion what another damping or stiffness does.
+Three cases are detected. An effect that is curved only where the motion has never been, such as a gap whose edges are never reached, is
+just a constant or a spring. An effect at a bound of its parameters is about to become another effect. A vibration, or a resonance as
+narrow as a spectral line, at a multiple of the forcing's frequency is equivalent to any change in the path of the forcing; at the
+frequency of a free motion it is equivalent to another damping or stiffness.
 """
 
 import math
@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 
 
 def shape_of(model: Model, added: Sequence[str], known: Trajectories, sizes: Scales) -> dict[str, float]:
-    """The worst statistic of the effects with the labels `added`, by the name of the rule that it is for.
+    """The smallest statistic of the effects with the labels `added`, by the name of the rule that uses it.
 
-    `known` is a fitted run of the same records, whose motion serves for all models.
+    `known` is a fitted run of the same records; its motion is used for all models.
     """
     found: dict[str, float] = {}
     for label in added:
@@ -43,7 +43,7 @@ def shape_of(model: Model, added: Sequence[str], known: Trajectories, sizes: Sca
 
 
 def _acts_within(known: Trajectories, model: Model, term: Term) -> float:
-    """Size of the effect's curvature within the motion's range, over that far beyond; infinite for a straight effect."""
+    """0 if an effect is curved only beyond the range of the motion; infinite if it is curved within it or straight."""
     element = term.element
     if element.kernel is None or element.own or element.history:
         return math.inf
@@ -61,7 +61,7 @@ def _acts_within(known: Trajectories, model: Model, term: Term) -> float:
 
 
 def within_bounds(term: Term, sizes: Scales) -> float:
-    """Least distance of a free parameter from a bound that the element's `ranges` set, as a share of that bound."""
+    """Smallest distance of a free parameter from a bound set by the element's `ranges`, as a share of that bound."""
     least = math.inf
     for name in term.element.ranges(sizes) if term.element.ranges is not None else ():
         if term.values[name].fixed:
@@ -73,8 +73,11 @@ def within_bounds(term: Term, sizes: Scales) -> float:
 
 
 def _own_frequency(term: Term, sizes: Scales) -> float:
-    """Distance of a vibration, or of a resonance as narrow as one, from the forcing's harmonics, in lines that the records
-    resolve, or in a free motion from the frequencies of that; infinite for other effects."""
+    """Distance of a vibration, or of a resonance as narrow as a spectral line, from the forcing's harmonics.
+
+    In a free motion, the distance from the frequencies of the motion. In frequency resolutions of the records; infinite for other
+    effects.
+    """
     forcing, line = sizes.forcing_frequency, 1.0 / sizes.duration
     free = forcing <= 0.0 and sizes.idle
     if term.element.kernel is None or (forcing <= 0.0 and not free):
@@ -91,7 +94,7 @@ def _own_frequency(term: Term, sizes: Scales) -> float:
 
 
 def _met(known: Trajectories, element: Element) -> Path:
-    """All that the element has met, one record after the other."""
+    """All signals that have acted on the element, concatenated over the records."""
     paths = known.paths if element.acts == "body" else known.legs
     if element.slot == "actuator":
         paths = [replace(path, signal=path.effort) for path in paths]
@@ -105,7 +108,7 @@ def _met(known: Trajectories, element: Element) -> Path:
 
 
 def _instants(met: Path, times: float) -> Path:
-    """Instants within so many times the ranges of a motion, all quantities drawn by themselves."""
+    """Random instants within `times` the range of a motion; all quantities are drawn independently."""
     rng = np.random.default_rng(0)
 
     def drawn(values: Array) -> Array:

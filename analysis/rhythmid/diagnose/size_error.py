@@ -7,17 +7,17 @@ from rhythmid.model import Model
 
 
 def size_errors(model: Model, labels: Sequence[str], std: Mapping[str, float]) -> dict[str, float]:
-    """Standard deviation of each effect's size, relative to its departure from the value at which the effect is absent.
+    """Standard deviation of each effect's size, relative to its difference from the value at which the effect is absent.
 
     Parameters
     ----------
     model
         A fitted model.
     labels
-        Of its effects; what is no effect, has no size that was estimated, or may be of any large size, is left out.
+        Labels of its effects. Labels of other things, and effects whose size is not estimated or may be arbitrarily large, are
+        left out.
     std
-        Standard deviations of the model's estimated parameters, by name: those of this model as it is, without what other models
-        would add.
+        Standard deviations of the model's estimated parameters, by name, without contributions from other models.
     """
     found = {}
     for label in labels:
@@ -25,7 +25,7 @@ def size_errors(model: Model, labels: Sequence[str], std: Mapping[str, float]) -
         if term is None or term.element.rigid or f"{label}.{term.element.size}" not in std:
             continue
         value, absent = term.values[term.element.size].value, term.element.absent
-        # where an infinite limit is no limit, its inverse is the size, and has the same relative error
+        # a limit is absent at infinity; the size of its effect is its inverse, with the same relative error
         departure = abs(value) if math.isinf(absent) else abs(value - absent)
         error = std[f"{label}.{term.element.size}"]
         found[label] = error / departure if departure > 0.0 and math.isfinite(error) else math.inf

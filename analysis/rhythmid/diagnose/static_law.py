@@ -1,7 +1,7 @@
-"""Static laws: effects whose force, or change of a signal, is a curved function of one quantity of the instant.
+"""Static laws: effects whose force, or change of a signal, is a curved function of one quantity at the same instant.
 
-The sum of several of them in one quantity is one law again, and may be one that the catalogue lacks, as powers of x are any
-smooth spring: then a free map of that quantity is another hypothesis in their place.
+Several of them in one quantity together form one law, which the catalogue may lack: a sum of powers of x, for example, approximates
+any smooth spring. A free map of that quantity is therefore another hypothesis in their place.
 """
 
 from collections.abc import Mapping
@@ -16,14 +16,14 @@ from rhythmid.model import Model
 from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
-INSTANTS = 400  # instants at which an effect is tried
-SPREAD = 3.0  # standard deviations of velocity and force that they cover
-MOSTLY = 0.3  # change, as a share of the effect, below which other quantities only correct it, as the damping of a stop
-SAME = 1e-9  # share of the effect below which what is left of it is rounding
+INSTANTS = 400  # random instants at which an effect is evaluated
+SPREAD = 3.0  # their range of velocity and force, in standard deviations
+MOSTLY = 0.3  # share of the effect by which other quantities may change it, as the damping of a stop does
+SAME = 1e-9  # share of the effect below which a remainder is rounding
 
 
 def curved(effect: Array, *quantities: Array) -> Array:
-    """The effect (n,) without its best straight line in the quantities (n,)."""
+    """The effect (n,) without its best linear fit in the quantities (n,)."""
     straight = np.column_stack(
         [np.ones(len(effect)), *(one / (np.abs(one).max() or 1.0) for one in quantities)]
     )
@@ -33,12 +33,21 @@ def curved(effect: Array, *quantities: Array) -> Array:
 def law_of(
     element: Element, values: Mapping[str, float], model: Model, sizes: Scales
 ) -> tuple[str, Array] | None:
-    """The one quantity of which the effect is a curved function: position, velocity, effort (the actuator's force) or
-    signal (what enters a command, actuator or sensor element), and the curved part of it (INSTANTS,), at the same instants
-    for every effect. None where the effect is straight, remembers, or takes several quantities. Raises nothing of its own.
+    """The one quantity of which the effect is a curved function, and the curved part of the effect.
 
-    `values` and `sizes` are in SI units (those of the sensor for a sensor element), the curved part in the unit of the
-    effect. A quantity is the one if exchanging all others between the instants leaves most of the effect as it was."""
+    Parameters
+    ----------
+    element, model : the element, and the model to which it belongs.
+    values, sizes : its parameters and the scales of the records, in SI units (those of the sensor for a sensor element).
+
+    Returns
+    -------
+    tuple or None
+        The quantity: position, velocity, effort (the actuator's force) or signal (the input of a command, actuator or sensor
+        element). The curved part (INSTANTS,) in the unit of the effect, at the same instants for every effect. None where the
+        effect is straight, has memory, or depends on several quantities. An effect depends on one quantity if exchanging the
+        values of all others between the instants leaves most of the effect unchanged.
+    """
     if element.kernel is None or element.own or element.history:
         return None
     rng = np.random.default_rng(0)
@@ -60,7 +69,7 @@ def law_of(
 
 
 def laws_of(trial: Trial, sizes: Scales) -> dict[tuple[str, str], dict[str, Array]]:
-    """The static laws among a model's added effects: their curved parts by label, by (slot, quantity)."""
+    """The static laws among a model's added effects: curved parts by label, grouped by (slot, quantity)."""
     found: dict[tuple[str, str], dict[str, Array]] = {}
     for label in trial.added:
         term = trial.model.term(label)

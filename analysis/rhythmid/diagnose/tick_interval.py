@@ -1,7 +1,8 @@
-"""The interval of a held command's period: whatever of it is likely.
+"""The confidence interval of a held command's period: all values that are likely.
 
-The likelihood of the ticks jumps (tick_likelihood.py), and no curvature tells how far it reaches. The likeliest of all cases tried
-around the fit goes on, the intervals of period and delay hold those of a chi2 as good, and sensitivities are taken across them.
+The likelihood of the tick period is discontinuous (tick_likelihood.py), so that its curvature gives no interval. The likeliest of all
+values tried around the fit is kept. The intervals of period and delay cover all values with a similar chi2, and sensitivities are
+differences across them.
 """
 
 from collections.abc import Sequence
@@ -21,12 +22,14 @@ from rhythmid.identify.sample_clock.tick_likelihood import moved_to, places_of, 
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-LIKELY = 6.0  # of chi2 above the best, up to which 95 % of two parameters are, here period and delay together
+LIKELY = 6.0  # excess of chi2 that covers 95 % of two parameters, here period and delay together
 
 
 def ticks_followed(found: Search, pool: ThreadPoolExecutor | None = None) -> Search:
-    """The search with the likeliest period (and input delay) of a drive's clock, and intervals that hold what is likely; as it is
-    without a clock that the search has added and whose period is free."""
+    """The search with the likeliest period (and input delay) of a drive's clock, and intervals that cover the likely values.
+
+    Unchanged unless the search has added a clock and its period is free.
+    """
     period = clock_of(found.fit.model)
     if period is None or period.split(".")[0] not in found.best.added or period not in found.fit.names:
         return found
@@ -38,7 +41,7 @@ def ticks_followed(found: Search, pool: ThreadPoolExecutor | None = None) -> Sea
     try:
         best = moved_to(fit, places, cases[np.argmin(costs)])
         again = minimise(best, fit.run, others, fit.noise, fit.starts, pool=pool)
-        if again.chi2 > fit.chi2:  # all else does not follow linearly, and the fit is as good as it gets
+        if again.chi2 > fit.chi2:  # the other parameters do not follow linearly; the earlier fit is better
             again = fit
         values = np.array([again.model.value(name) for name in fit.names])
         reach = np.max(np.abs(likely - values[places]), axis=0)
@@ -56,14 +59,14 @@ def ticks_followed(found: Search, pool: ThreadPoolExecutor | None = None) -> Sea
 def _covariance(
     fit: Fit, model: Model, places: Sequence[int], reach: Array, pool: ThreadPoolExecutor | None
 ) -> Array:
-    """Covariance (p, p) with the sensitivities to period and delay taken over what is likely, across the jumps."""
+    """Covariance (p, p) with the sensitivities to period and delay as differences across the likely range and its jumps."""
     jacobian = fit.linearisation.jacobian.copy()
     for place, step in zip(places, reach):
         name = fit.names[place]
         step = max(step, END * fit.std[name] if np.isfinite(fit.std[name]) else 0.0)
         if step == 0.0:
             continue
-        low, high = model.parameters[name].bounds  # a nuisance's delay may lie below zero
+        low, high = model.parameters[name].bounds  # the delay of a nuisance may be negative
         values = np.clip(model.value(name) + step * np.array([1.0, -1.0]), low, high).tolist()
         ends = [model.with_values({name: value}) for value in values]
         outputs = fit.run.many([(end, fit.starts) for end in ends], pool)

@@ -1,9 +1,9 @@
-"""Density of blocks of errors whose scale varies from block to block.
+"""Log density of blocks of errors whose scale varies from block to block.
 
-What a model leaves is seldom as large in slow moves as in fast ones. Under one scale for all, a hypothesis that explains nearly
-everything in one record and half in another would be worth less there than one that explains nothing. So the scale of each block
-is unknown, log-normal about that of the blocks which the fit saw, and integrated out by Laplace's method
-(L. Tierney, J. B. Kadane, J. Am. Stat. Assoc. 81 (1986) 82).
+A model's error is seldom as large in slow moves as in fast ones. With one scale for all blocks, a hypothesis that explains
+nearly everything in one record and half of a second one would score worse in the second than a hypothesis that explains
+nothing. The scale of each block is therefore unknown, log-normal about that of the blocks which the fit saw, and integrated
+out by Laplace's method (L. Tierney, J. B. Kadane, J. Am. Stat. Assoc. 81 (1986) 82).
 """
 
 import math
@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from rhythmid.identify.student import DEGREES, log_density, scale_of
 
 Array = NDArray[np.float64]
-# scale of a block at least, as a share of that of the others: a block with less error holds nothing to predict, such as a rest
+# smallest scale of a block, relative to that of the others: a block with less error, such as a rest, holds nothing to predict
 QUIETEST = 0.01
-INFORMATION = 2.0 * DEGREES / (DEGREES + 3.0)  # of one error of Student's t on the logarithm of its scale
+INFORMATION = (
+    2.0 * DEGREES / (DEGREES + 3.0)
+)  # information of one Student's t error on the logarithm of its scale
 
 
 def block_densities(
@@ -29,9 +31,9 @@ def block_densities(
     ----------
     errors : the errors of each block, b arrays.
     scales : (b,) scale that the fit expects of each block.
-    time : autocorrelation time in samples.
-    seen : (b,) blocks from which is learnt how much scales vary; of the others no fit has seen anything.
-    least : scale that errors have at least, such as that of rounding.
+    time : autocorrelation time [samples].
+    seen : (b,) blocks from which the variation of the scales is estimated; no fit has seen the others.
+    least : lower limit of the error scale, such as that of rounding.
 
     Returns
     -------
@@ -48,7 +50,7 @@ def block_densities(
     variance = _between(own[seen], information[seen])
     share = (
         variance * information / (1.0 + variance * information)
-    )  # that a block's own scale has in the estimate
+    )  # weight of a block's own scale in the estimate
     shift = share * own
     found = np.array(
         [log_density(one, float(scale)).sum() for one, scale in zip(errors, scales * np.exp(shift))]
@@ -58,7 +60,7 @@ def block_densities(
 
 
 def _between(own: Array, information: Array) -> float:
-    """Variance between blocks of the logarithm of their scales (b,), less what their estimates scatter by themselves."""
+    """Variance between blocks of the logarithm of their scales (b,), without the variance of its estimates."""
     known = information > 0.0
     if known.sum() < 2:
         return 0.0

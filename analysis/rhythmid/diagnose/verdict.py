@@ -26,12 +26,17 @@ NOT_GRANTED = "{} effects that are not established ({})"
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What the chosen hypothesis leaves and a free map predicts.
+    """What the chosen hypothesis leaves and a free map or a richer hypothesis predicts.
 
-    `share` is that of the explainable mismatch; `goes_with` the quantity of the free map that predicts it best; `significant`
-    whether that is more than chance. `expected` is the largest share of all, significant or not, each times the chance that
-    it is real. `least` is the mean square that it removes at least, `EQUIVALENT` standard errors below the estimate. `further` names the
-    effects that predict it beside the chosen ones where they, and no free map, predict it best: they are granted no place.
+    Attributes
+    ----------
+    share : share of the explainable mismatch.
+    significant : whether it is more than chance.
+    goes_with : the quantity of the free map that predicts it best.
+    expected : the largest share of all, significant or not, each multiplied by the chance that it is real.
+    least : mean square that it removes at least, `EQUIVALENT` standard errors below the estimate.
+    further : the effects that predict it beside the chosen ones, where these predict it best and not a free map; they were not
+        accepted.
     """
 
     share: float
@@ -44,21 +49,21 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Decision:
-    """What the evidence says.
+    """The decision that follows from the evidence.
 
     Parameters
     ----------
-    verdict, reason : the verdict, and in words why.
+    verdict, reason : the verdict, and the reason in words.
     rule : name of the verdict rule that applied.
-    named : labels of the effects that the answer stands by or, where it does not, that come nearest; by share.
-    shares : share of the mismatch that each of them explains, by label.
-    probability : of each of them, by label.
+    named : labels of the stated effects, by share; where none is stated, of those that come nearest.
+    shares : share of the mismatch that each effect explains, by label.
+    probability : probability of each effect, by label.
     joint : joint probability of all `named`.
-    weights : of each hypothesis, by its key.
+    weights : weight of each hypothesis, by its key.
     equivalent : groups of names that the evidence does not separate, the chosen one first; of `named` only.
     unexplained : what is left.
-    beside : names of effects that the chosen model has, too, too uncertain for the answer to stand by them.
-    families : of the effects of the chosen hypothesis, where the verdict tells them.
+    beside : names of further effects of the chosen model that are too uncertain to be stated.
+    families : families of the chosen hypothesis' effects, where the verdict tells them.
     """
 
     verdict: Verdict
@@ -76,7 +81,7 @@ class Decision:
 
 
 def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
-    """What is left beside a hypothesis: what free maps predict, or hypotheses with more effects that were not granted."""
+    """The remainder beside a hypothesis: what free maps predict, or hypotheses with more effects that were not accepted."""
     whole = contest.nominal.prediction.mean_square - contest.floor
     rivals = [(quantity, (), one, len(contest.maps)) for quantity, one in contest.maps.items()]
     rivals += [
@@ -101,35 +106,40 @@ def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
     less, quantity, further, least = max(found)
     if further:
         beside = any(set(one.names) == {*chosen.names, *further} for one in contest.hypotheses)
-        kind = "further" if beside else "other"  # beside the chosen ones, or in their place
+        kind = "further" if beside else "other"  # in addition to the chosen effects, or in their place
         quantity = NOT_GRANTED.format(kind, ", ".join(further).replace("_", " "))
     return Unexplained(float(min(less / whole, 1.0)), True, quantity, expected, max(least, 0.0), further)
 
 
 def significance(prediction: Prediction, candidates: int) -> float:
-    """Standard errors that the best of so many rivals has to gain, by Student's t over the blocks: what is left has to show all
-    over the records, or it says nothing of the names."""
+    """Standard errors that the best of so many rivals has to gain, by Student's t over the blocks.
+
+    A remainder must show all over the records; otherwise it does not contradict the names.
+    """
     blocks = len(prediction.log_density)
     return float(student.isf(FALSE_ALARM / max(candidates, 1), max(blocks - 1, 1)))
 
 
 def _further(other: Hypothesis, chosen: Hypothesis) -> tuple[str, ...]:
-    """Names of the effects of another hypothesis that the chosen one does not have."""
+    """Names of the effects of another hypothesis that are not in the chosen one."""
     return tuple(name for name in other.names if name not in chosen.names)
 
 
 def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:
-    """Share of the explainable mismatch that each effect of a hypothesis removes, by label: what it removes as the last of them or, where
-    that is more, the mean of this and of what it removes as the first, for two effects the Shapley value (L. S. Shapley, Contributions to the
-    Theory of Games 2 (1953) 307). Effects may stand in for one another, so that neither removes much as the last; or mask one another, so
-    that neither does as the first."""
+    """Share of the explainable mismatch that each effect of a hypothesis removes, by label.
+
+    It is what the effect removes when it is added last or, if that is larger, the mean of this and of what it removes when it is
+    added first. For two effects the mean is the Shapley value (L. S. Shapley, Contributions to the Theory of Games 2 (1953) 307).
+    Effects may replace one another, so that neither removes much when added last; or mask one another, so that neither removes
+    much when added first.
+    """
     nominal, after = contest.nominal.prediction.mean_square, chosen.prediction.mean_square
     whole = nominal - contest.floor
     squares = {one.key: one.prediction.mean_square for one in contest.hypotheses}
     found = {}
     for label in chosen.elements:
         rest = set(chosen.elements) - {label}
-        # the best of the fitted models without it
+        # the best of the fitted models without this effect
         without = min(square for key, square in squares.items() if set(key) <= rest)
         last = without - after
         first = nominal - squares[label,] if rest and (label,) in squares else last
@@ -139,8 +149,11 @@ def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:
 
 
 def lost_share(contest: Contest, chosen: Hypothesis) -> float:
-    """Share of the mismatch that a hypothesis leaves in a way which follows from its own past, beyond what models of real machines leave: it is
-    no noise, and no more explained than what a free map predicts of it, although nothing that was tried does."""
+    """Predictable share of the mismatch that a hypothesis leaves, beyond what models of real machines leave.
+
+    An error that follows from its own past is not noise. It counts as unexplained, like the part that a free map predicts, although
+    nothing that was tried predicts it.
+    """
     whole = contest.nominal.prediction.mean_square - contest.floor
     structured = contest.structured_after**2 * chosen.prediction.mean_square
     beyond = structured - (LEFT * contest.size) ** 2
@@ -148,7 +161,7 @@ def lost_share(contest: Contest, chosen: Hypothesis) -> float:
 
 
 def _groups(contest: Contest, selection: Selection) -> tuple[tuple[str, ...], ...]:
-    """Names that replace one another in hypotheses which predict as well as the chosen one."""
+    """Groups of names that can replace one another in hypotheses that predict as well as the chosen one."""
     chosen = selection.chosen
     groups = []
     for label, name in zip(chosen.elements, chosen.names):
@@ -174,10 +187,9 @@ def decide(
     """The decision on a selection.
 
     Parameters
-    ----------
     contest, selection : all hypotheses, and the chosen one.
-    detectable : the smallest effect that these records would show, as a share of the motion or of the effort.
-    size_errors : of the chosen effects, by label, the relative standard deviations of their sizes, see `size_errors`.
+    detectable : the smallest detectable effect, as a share of the motion or of the effort.
+    size_errors : relative standard deviations of the chosen effects' sizes, by label; see `size_errors`.
     """
     chosen = selection.chosen
     left = unexplained(contest, chosen)
@@ -185,9 +197,9 @@ def decide(
     weights = weights_of(contest, selection)
     labels = tuple(sorted(chosen.elements, key=lambda label: -round(shares[label], 6)))
     names = dict(zip(chosen.elements, chosen.names))
-    if chosen.kind == "free_map":  # the map is no name
+    if chosen.kind == "free_map":  # a map is not a name
         labels = tuple(label for label in labels if label != chosen.elements[-1])
-    if chosen.kind == "delay" and chosen.effects:  # a delay beside effects is told with the delays
+    if chosen.kind == "delay" and chosen.effects:  # a delay beside effects is reported with the delays
         labels = tuple(label for label in labels if label != INPUT_DELAY)
     lost = left.expected + lost_share(contest, chosen)
     family = {label: chosen.family.get(names[label], "") for label in labels}
@@ -210,7 +222,7 @@ def decide(
         return names[one] == names[label] and labels.index(one) <= labels.index(label)
 
     def probability(some: Sequence[str]) -> float:
-        # of effects that are called the same, the smaller one is there only beside the larger ones
+        # of effects with the same name, the smaller one exists only beside the larger ones
         all_of_them = [one for one in labels if any(stands_for(one, label) for label in some)]
         held = joint_probability([names[label] for label in all_of_them], contest, chosen, weights)
         return min((sure[label] for label in some), default=1.0) * held
@@ -257,7 +269,7 @@ def decide(
 
 
 def _stated(labels: Sequence[str], probability: Callable[[Sequence[str]], float]) -> tuple[str, ...]:
-    """As many of the effects, those with the largest shares first, as are jointly probable enough to be stated."""
+    """The largest number of effects, those with the largest shares first, that are jointly probable enough to be stated."""
     found: tuple[str, ...] = ()
     for count in range(1, len(labels) + 1):
         if probability(labels[:count]) < STATED:

@@ -1,7 +1,7 @@
-"""Verdict rules: what the evidence comes to, one row each of one table; the first row that applies gives verdict and reason.
+"""Verdict rules: one row each of one table; the first row that applies to the evidence gives verdict and reason.
 
-A row has a statistic, and applies where that is above its threshold. `python -m rhythmid.diagnose.verdict_rules` prints the table
-as Markdown.
+A row has a statistic, and applies where the statistic is above its threshold. `python -m rhythmid.diagnose.verdict_rules` prints the
+table as Markdown.
 """
 
 from collections.abc import Callable
@@ -13,25 +13,25 @@ from rhythmid.diagnose.hypothesis import Kind, Verdict
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a verdict depends on.
+    """The quantities on which a verdict depends.
 
     Parameters
     ----------
-    kind : of the chosen hypothesis; that of the nominal model where nothing was added to it.
-    stated : number of its effects, those with the largest shares first, that are probable enough together to be stated.
-    delay_alone : whether of a longer delay and effects no effect is stated.
-    value_alone : whether a value is set free and it, or no effect that is stated, has the largest share.
-    left : share of the mismatch that it leaves and something else predicts.
-    goes_with : the quantity that this depends on.
-    remainder : rms of what it leaves and something else predicts by more than chance, at least, over the smallest of practical importance.
-    missed : rms error of the chosen hypothesis, as a share of what was measured.
-    structured : the part of it that follows from its own past, so that it is no noise.
-    lost : the same by the share of the model with which the search ended.
-    astray : its error on held-out data, over that up to which a model follows the machine.
-    detectable : smallest effect that the records would show, the same.
-    vague : standard deviation of the size of its effect with the largest share, relative to the size.
-    evidence : share of the evidence for hypotheses that hold all of its names.
-    alike : whether other names predict as well in the place of one of them.
+    kind : kind of the chosen hypothesis; "nominal" where nothing was added.
+    stated : number of its effects, those with the largest shares first, that are jointly probable enough to be stated.
+    delay_alone : whether the hypothesis is a longer delay and none of its effects is stated.
+    value_alone : whether the hypothesis frees a value, and no stated effect has the largest share.
+    left : share of the mismatch that the hypothesis leaves and something else predicts.
+    goes_with : the quantity that this remainder depends on.
+    remainder : lower limit of the rms of the significant remainder, relative to the smallest size of practical importance.
+    missed : rms error of the chosen hypothesis, as a share of the measurement.
+    structured : the part of `missed` that is predictable from its own past, hence not noise; with the share of the nominal model.
+    lost : the same with the share of the model with which the search ended.
+    astray : its error on held-out data, relative to that up to which a model follows the machine.
+    detectable : smallest detectable effect, as a share of the motion or of the effort.
+    vague : relative standard deviation of the size of the effect with the largest share.
+    evidence : share of the evidence held by hypotheses that contain all of its names.
+    alike : whether other names predict as well in place of one of them.
     cut_short : whether the budget ended the search before all effects that scored well were tried.
     """
 
@@ -55,9 +55,9 @@ class Outcome:
 
 @dataclass(frozen=True)
 class VerdictRule:
-    """One row: it applies to an outcome whose `statistic` is above the `threshold`; fields of the outcome stand in its `reason`.
+    """One row: it applies to an outcome whose `statistic` is above the `threshold`; fields of the outcome are inserted into `reason`.
 
-    `tells_family`: whether the answer tells the families of the effects with their probabilities, although it may state no name.
+    `tells_family`: whether the answer gives the families of the effects with their probabilities, although it may state no name.
     """
 
     name: str
@@ -81,7 +81,7 @@ class VerdictRule:
 
 
 def _alone(statistic: Callable[[Outcome], float]) -> Callable[[Outcome], float]:
-    """The statistic where nothing was added to the nominal model, else 0."""
+    """The statistic if nothing was added to the nominal model, else 0."""
     return lambda found: statistic(found) if found.kind == "nominal" else 0.0
 
 
@@ -90,7 +90,7 @@ def _is(kind: Kind) -> Callable[[Outcome], float]:
 
 
 def _of_search(statistic: Callable[[Outcome], float], cut_short: bool) -> Callable[[Outcome], float]:
-    """The statistic where the search was cut short, or where it was not, else 0."""
+    """The statistic if the search was cut short, or was not, as `cut_short` says; else 0."""
     return lambda found: statistic(found) if found.cut_short is cut_short else 0.0
 
 
@@ -270,7 +270,7 @@ def table() -> str:
 
 
 def _words(reason: str) -> str:
-    """A reason as it is told, with an ellipsis for each figure."""
+    """A reason with an ellipsis for each figure."""
     figures = {
         "goes_with": "…",
         "left": "…",

@@ -1,7 +1,7 @@
-"""Linear chirps, one after another, each starting at another phase of the machine's period (paper, equation (14)).
+"""Linear chirps, one after another, starting at different phases of the machine's period (paper, equation (14)).
 
-With `shift: {period: T, count: K}` each chirp takes sweep + gap + T/K: K of them start at K phases spread evenly over T,
-and together they form a comb whose harmonics fall into separate frequency bins (period T_c = (n + 1/K) T).
+With `shift: {period: T, count: K}` each chirp takes sweep + gap + T/K. K chirps then start at K phases spread evenly over T.
+Together they form a comb whose harmonics fall into separate frequency bins (period T_c = (n + 1/K) T).
 """
 
 import math
@@ -25,7 +25,7 @@ class Chirp(Excitation):
     """u_i(t) = A sin(2π (f₀ t + (f₁ − f₀) t²/(2 S)) + φ) during the sweep S, zero in the gap that follows.
 
     With A = 0.004 N, band 0 to 7 Hz and S = 30 s this is 0.004 sin(7π t²/30), the paper's equation (14). `warm_up`
-    further repetitions come first; `start_delay` [s] of silence precedes all.
+    further repetitions come first. `start_delay` [s] of silence precedes all.
     """
 
     type: Literal["chirp"] = "chirp"
@@ -47,7 +47,7 @@ class Chirp(Excitation):
 
     @property
     def cycle(self) -> float:
-        """Time from one chirp's start to the next one's [s]."""
+        """Time [s] from the start of one chirp to the start of the next."""
         return self.sweep + self.gap + (self.shift.period / self.shift.count if self.shift else 0.0)
 
     @property
@@ -60,7 +60,7 @@ class Chirp(Excitation):
 
     def shape(self, time: Array) -> Array:
         local = time - self.start_delay
-        # the small offset keeps a sample that rounding puts just before a start with the chirp that starts there
+        # a small offset: a sample that rounding puts just before a start belongs to the chirp that starts there
         t = local - np.floor(local / self.cycle + 1e-9) * self.cycle
         low, high = self.band
         angle = 2 * math.pi * (low * t + (high - low) * t**2 / (2 * self.sweep)) + self.phase

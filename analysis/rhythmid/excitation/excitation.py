@@ -1,4 +1,4 @@
-"""What every excitation is: a pure function of the time since its start, with a known duration and peak."""
+"""The base class of excitations: a pure function of the time since its start, with a known duration and peak."""
 
 from abc import ABC, abstractmethod
 
@@ -25,7 +25,7 @@ class Excitation(BaseModel, ABC):
 
     @property
     def peak(self) -> float:
-        """Largest |u| [N], found on a 1 ms grid unless an excitation knows better."""
+        """Largest |u| [N], by default found on a 1 ms grid."""
         return float(np.max(np.abs(self(np.arange(0.0, self.duration, 1e-3))), initial=0.0))
 
     def __call__(self, time: Array) -> Array:

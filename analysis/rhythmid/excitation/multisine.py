@@ -1,4 +1,4 @@
-"""Multisines: sums of harmonics of 1/period, repeated; every line is known exactly, so noise shows between the lines.
+"""Multisines: sums of harmonics of 1/period, repeated. Every line is known exactly, so that noise shows between the lines.
 
 R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., Wiley 2012, chapter 2.
 """
@@ -13,16 +13,16 @@ from scipy.fft import next_fast_len
 from rhythmid.errors import InputError
 from rhythmid.excitation.excitation import Array, Excitation
 
-FINENESS = 64  # samples in the shortest period, among which the largest is found: it is short by a thousandth at most (1 - cos(pi/64))
+FINENESS = 64  # samples in the shortest period, for finding the peak; it is missed by a thousandth at most (1 - cos(pi/64))
 
 
 class Multisine(Excitation):
     """u(t) = Σ_k a_k cos(2π k t / period + φ_k).
 
-    Lines are given outright (`lines`, with optional relative `weights` and `phases` [rad]), or chosen from `band`:
-    all of them, the odd ones (even distortion then shows on even lines), or with a `pumping` frequency one residue class
-    (k mod P) = `residue`, so that every sideband of a line falls on a class of its own. `rms` [N] sets the size. Of the chosen lines
-    `part` [i, n] leaves the i-th and every n-th after it: n such signals are orthogonal over a period.
+    Lines are given explicitly (`lines`, with optional relative `weights` and `phases` [rad]) or chosen from `band`. They are
+    all lines of the band; only the odd ones (even distortion then shows on even lines); or, with a `pumping` frequency, one
+    residue class (k mod P) = `residue`, so that every sideband of a line falls into a class of its own. `rms` [N] sets the size.
+    `part` [i, n] keeps the i-th of the chosen lines and every n-th after it: n such signals are orthogonal over a period.
     """
 
     type: Literal["multisine"] = "multisine"
@@ -86,7 +86,7 @@ class Multisine(Excitation):
 
     @property
     def peak(self) -> float:
-        """Largest |u| [N] of a period: by a Fourier transform, for a long period has thousands of lines."""
+        """Largest |u| [N] of a period, found by a Fourier transform because a long period has thousands of lines."""
         k, amplitude, phase = self._lines()
         least = FINENESS * int(k.max())
         count = next_fast_len(least, real=True) or least

@@ -9,7 +9,7 @@ from rhythmid.excitation.excitation import Array, Excitation
 
 
 class Profile(Excitation):
-    """u(t) through `points` [[time s, force N], …]: `step` holds each value until the next point, `ramp` joins them."""
+    """u(t) through `points` [[time s, force N], …]: `step` holds each value until the next point, `ramp` interpolates linearly."""
 
     type: Literal["profile"] = "profile"
     points: Annotated[tuple[tuple[float, float], ...], Field(min_length=1)]

@@ -1,4 +1,4 @@
-"""A command read from a file: what the designer wrote, or any other sequence of samples."""
+"""A command read from a file: the designer's samples or any others."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -10,7 +10,7 @@ from pydantic import AfterValidator, ValidationInfo
 from rhythmid.excitation.excitation import Array, Excitation
 from rhythmid.time_table import read_time_table
 
-IN_FOLDER = "folder"  # key of the validation's context
+IN_FOLDER = "folder"  # key in the validation context
 
 
 @lru_cache(maxsize=8)
@@ -19,7 +19,7 @@ def _table(file: str) -> tuple[Array, Array]:
 
 
 def _resolved(file: Path, info: ValidationInfo) -> Path:
-    """A file's name in a description is relative to the file that holds the description."""
+    """Path of a file; a name in a description is relative to the file that contains the description."""
     return (info.context or {}).get(IN_FOLDER, Path()) / file
 
 

@@ -18,7 +18,7 @@ from rhythmid.validation import validated
 
 
 class Sequence(Excitation):
-    """The `parts` one after another, the whole repeated `repetitions` times (a repeat shows noise and drift)."""
+    """The `parts` one after another, the whole repeated `repetitions` times; differences between repeats show noise and drift."""
 
     type: Literal["sequence"] = "sequence"
     parts: Annotated[tuple["AnyExcitation", ...], Field(min_length=1)]
@@ -54,7 +54,7 @@ _ADAPTER: TypeAdapter[Excitation] = TypeAdapter(AnyExcitation)
 def build(spec: Mapping[str, Any], folder: str | Path = ".") -> Excitation:
     """The excitation that `spec` describes: {type: chirp | multisine | profile | samples | silence | sequence, …}.
 
-    File names in it are relative to `folder`. Raises InputError, naming the key, for whatever is wrong.
+    File names in it are relative to `folder`. Raises InputError naming the invalid key.
     """
     made = validated(as_node(spec, "excitation"), _ADAPTER, {IN_FOLDER: Path(folder)})
     _ = made.duration  # reads the table of samples

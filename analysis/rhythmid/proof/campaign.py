@@ -1,4 +1,4 @@
-"""Many cases, several at a time, each drawn, sealed, diagnosed, opened and scored; what is done is never done again."""
+"""Run many cases in parallel: each is drawn, sealed, diagnosed, opened and scored; finished cases are not repeated."""
 
 import json
 import multiprocessing
@@ -27,8 +27,13 @@ from rhythmid.proof.perform import perform
 from rhythmid.proof.score import Score, score
 from rhythmid.proof.seal import seal, truth_of, unseal
 
-SHARES: dict[Kind, int] = {"single": 3, "null": 3, "pairs": 1, "left-out": 1}  # of a campaign of all kinds
-LIFETIME = 40  # cases that a worker process does before a fresh one takes its place
+SHARES: dict[Kind, int] = {
+    "single": 3,
+    "null": 3,
+    "pairs": 1,
+    "left-out": 1,
+}  # proportions in a campaign of all kinds
+LIFETIME = 40  # cases after which a worker process is replaced
 ALL = "all"  # machines
 SEALED, CASES = "sealed", "cases"
 Report = Callable[["Sealed | Score"], None]
@@ -36,7 +41,7 @@ Report = Callable[["Sealed | Score"], None]
 
 @dataclass(frozen=True)
 class Task:
-    """One case to be done; `budget` [s] bounds its diagnosis, 0 stands for none."""
+    """One case to run; `budget` [s] limits its diagnosis, 0 means no limit."""
 
     seed: int
     kind: Kind
@@ -51,14 +56,14 @@ class Task:
 
     @property
     def stream(self) -> list[int]:
-        """Seeds of the noise: no two cases have the same."""
+        """Seeds of the noise, different for every case."""
         apart = [list(DESIGNS).index(self.design), int(self.cluttered)]
         return [self.seed, KINDS.index(self.kind), self.index, 1_000_000, *(apart if any(apart) else [])]
 
 
 @dataclass(frozen=True)
 class Sealed:
-    """Told before a diagnosis begins."""
+    """The hash of a sealed truth, reported before the diagnosis begins."""
 
     case: str
     sha256: str
@@ -66,8 +71,11 @@ class Sealed:
 
 @dataclass(frozen=True)
 class Campaign:
-    """What is to be proved: `cases` cases of a kind, or of all kinds in the proportions of `SHARES`; on one machine, or on all
-    in turns; with clutter or clean."""
+    """A set of cases.
+
+    `cases` cases of one kind, or of all kinds in the proportions of `SHARES`; on one machine or on all in turn; with or without
+    clutter.
+    """
 
     seed: int
     kind: str
@@ -84,7 +92,7 @@ class Campaign:
         found: list[Task] = []
         counts: dict[Kind, int] = dict.fromkeys(KINDS, 0)
         for number in range(self.cases):
-            # 3 and the sum of the shares have no common divisor
+            # 3 and the sum of the shares are coprime
             drawn: list[Kind] = [one for one in KINDS if one == self.kind] or [order[(number * 3) % whole]]
             kind = drawn[0]
             index, machine = divmod(counts[kind], len(machines))
@@ -116,21 +124,21 @@ def _prepare(task: Task, out: Path) -> Sealed:
 
 
 def _diagnose(task: Task, out: Path, absent: Sequence[str]) -> None:
-    """Diagnose from the case's folder; `absent` are the elements that the catalogue is robbed of."""
+    """Diagnose from the case's folder; `absent` are the elements removed from the catalogue."""
     folder = out / CASES / task.name
     answer = examine(folder, load_catalogue().without(*absent), task.budget or None)
     write_json(folder / "answer.json", answer)
 
 
 def _absent(task: Task, out: Path) -> tuple[str, ...]:
-    """Which elements the catalogue loses: the one thing of the truth that must be known beforehand."""
+    """Elements removed from the catalogue: the only part of the truth that must be known before the diagnosis."""
     if task.kind != "left-out":
         return ()
     return tuple(json.loads((out / SEALED / f"{task.name}.json").read_text(encoding="utf-8"))["absent"])
 
 
 def _open(task: Task, out: Path, told: str, keep: bool) -> Score:
-    """Open the seal, score, and clear away the bags."""
+    """Open the seal, score, and remove the bags."""
     folder = out / CASES / task.name
     truth = unseal(out / SEALED / f"{task.name}.json", told)
     answer = json.loads((folder / "answer.json").read_text(encoding="utf-8"))
@@ -148,7 +156,7 @@ def read_score(path: Path) -> Score:
 
 
 def _begin(cores: Sequence[int], parent: int) -> None:
-    """Keep to these processors, and end when the `parent` has: a signal that ends it does not reach its workers."""
+    """Use only these processors, and end when the `parent` has ended: a signal that ends it does not reach its workers."""
     if cores and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, cores)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
@@ -161,7 +169,7 @@ def _end_with(parent: int) -> None:
 
 
 def _shares(jobs: int) -> list[list[int]]:
-    """Processors of each worker: together all of them, no two workers on the same one while there are enough."""
+    """Processors of each worker; all are used, and no two workers share one while there are enough."""
     if not hasattr(os, "sched_getaffinity"):
         return [[] for _ in range(jobs)]
     cores = sorted(os.sched_getaffinity(0))
@@ -171,7 +179,7 @@ def _shares(jobs: int) -> list[list[int]]:
 
 
 class _Worker:
-    """A process of its own that does one case after another, and is replaced when it dies or has grown old."""
+    """A process that runs one case after another, and is replaced when it dies or after `LIFETIME` cases."""
 
     def __init__(self, cores: Sequence[int]) -> None:
         self._cores = cores
@@ -195,7 +203,7 @@ class _Worker:
 
 
 def _steps(task: Task, out: Path, keep: bool, worker: _Worker, report: Report) -> Iterator[Future]:
-    """The steps of a case, each a future of its worker: sealed first, opened last."""
+    """The steps of a case, each a future of its worker: the first seals, the last opens."""
     ready = worker.submit(_prepare, task, out)
     yield ready
     sealed = ready.result()
@@ -211,7 +219,7 @@ def _steps(task: Task, out: Path, keep: bool, worker: _Worker, report: Report) -
 
 
 def read_campaign(out: Path) -> Campaign:
-    """The campaign that a folder holds. Raises InputError when it holds none."""
+    """The campaign stored in a folder. Raises InputError when there is none."""
     about = out / "campaign.json"
     if not about.exists():
         raise InputError(f"{out}: holds no campaign")
@@ -240,13 +248,13 @@ def begin(out: Path, campaign: Campaign, resume: bool) -> None:
 
 
 def scores_in(out: Path, tasks: Sequence[Task]) -> list[Score]:
-    """Scores of the cases that are done."""
+    """Scores of the finished cases."""
     paths = [out / CASES / task.name / "score.json" for task in tasks]
     return [read_score(path) for path in paths if path.exists()]
 
 
 def write_card(out: Path, campaign: Campaign) -> list[Score]:
-    """Write the score card, `proof.md` and `proof.json`, of the cases that are done."""
+    """Write the score card of the finished cases, `proof.md` and `proof.json`."""
     tasks = campaign.tasks
     scores = scores_in(out, tasks)
     write_text(out / "proof.md", markdown(scores, campaign.command, len(scores) == len(tasks)))
@@ -257,9 +265,9 @@ def write_card(out: Path, campaign: Campaign) -> list[Score]:
 def carry_out(
     out: Path, tasks: Sequence[Task], jobs: int, report: Report, keep: bool = False
 ) -> dict[str, str]:
-    """Do the cases that have no score yet, `jobs` at a time, each worker on processors of its own.
+    """Run the cases that have no score yet, `jobs` at a time, each worker on its own processors.
 
-    Returns the failures of the proof itself (not of a diagnosis, which are scored), by case.
+    Returns failures of the proof itself, by case; failures of a diagnosis are scored.
     """
     left = [task for task in tasks if not (out / CASES / task.name / "score.json").exists()]
     waiting = iter(left)
@@ -275,7 +283,7 @@ def carry_out(
         except BrokenProcessPool:
             worker.forget()
             failures[task.name] = "the process died"
-        except Exception:  # whatever went wrong with one case, the others go on
+        except Exception:  # the other cases continue, whatever went wrong with this one
             failures[task.name] = traceback.format_exc()
         return False
 

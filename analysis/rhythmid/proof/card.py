@@ -17,19 +17,19 @@ BINS = ((0.3, 1.0), (1.0, 3.0), (3.0, math.inf))
 
 
 def coverage(estimates: Sequence[Estimated]) -> Rate:
-    """How many 95 % intervals hold the true value."""
+    """Rate of 95 % intervals that contain the true value."""
     return Rate(sum(abs(one.deviation) <= NORMAL_95 for one in estimates), len(estimates))
 
 
 def said(score: Score) -> str:
-    """What a case was answered with, in a word or two."""
+    """The answer to a case in a word or two."""
     if score.outcome in ("exact", "family", "wrong"):
         return " + ".join(score.named)
     return score.outcome
 
 
 def confusion(scores: Sequence[Score]) -> dict[str, Counter[str]]:
-    """How often each concealed effect got each answer."""
+    """Counts of the answers given for each concealed effect."""
     table: dict[str, Counter[str]] = {}
     for one in scores:
         table.setdefault(" + ".join(one.true) or "nothing", Counter())[said(one)] += 1
@@ -37,7 +37,7 @@ def confusion(scores: Sequence[Score]) -> dict[str, Counter[str]]:
 
 
 def _rates(kind: str, scores: Sequence[Score]) -> dict[str, Rate]:
-    """The rates of a kind of case, by what they are rates of."""
+    """The rates of a kind of case, by what they count."""
     sure = {f"stated with p ≥ {SURE} and wrong": rate(scores, lambda s: bool(s.stated_wrong))}
     if kind == "null":
         found = {
@@ -78,7 +78,7 @@ def _rates(kind: str, scores: Sequence[Score]) -> dict[str, Rate]:
 
 
 def _kind_rates(scores: Sequence[Score]) -> dict[str, Rate]:
-    """Whether the kind of what is missing is stated, and how many of the families that are stated are not there."""
+    """Rate of cases in which the dominant effect's family is stated, and rate of stated families that are wrong."""
     stated = [one for score in scores for one in score.kinds_stated]
     return {
         f"family of the dominant effect stated with p ≥ {SURE}": rate(scores, lambda s: s.kind_right),
@@ -89,7 +89,7 @@ def _kind_rates(scores: Sequence[Score]) -> dict[str, Rate]:
 
 
 def _machines(kind: str, scores: Sequence[Score]) -> dict[str, dict[str, Rate]]:
-    """The main rates of a kind by machine."""
+    """The main rates of a kind of case, by machine."""
     right: dict[str, Callable[[Score], bool]] = {
         "null": lambda s: s.outcome == "consistent", "left-out": lambda s: s.honest,
     }  # fmt: skip
@@ -109,7 +109,7 @@ def _sizes(scores: Sequence[Score]) -> list[tuple[str, list[Score]]]:
 
 
 def summary(scores: Sequence[Score]) -> dict[str, Any]:
-    """The whole score card as plain data."""
+    """The complete score card as plain data."""
     card: dict[str, Any] = {}
     for group in dict.fromkeys(one.group for one in scores):
         some = [one for one in scores if one.group == group]
@@ -151,7 +151,7 @@ def _spread(values: Sequence[float]) -> dict[str, float]:
 
 
 def markdown(scores: Sequence[Score], command: str, complete: bool = True) -> str:
-    """The score card to be read."""
+    """The score card as Markdown."""
     lines = ["# Concealed proof", "", f"    {command}", ""]
     if not complete:
         lines += ["Not all cases have been scored yet.", ""]

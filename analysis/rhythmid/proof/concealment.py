@@ -1,4 +1,4 @@
-"""How much of an effect is concealed: enough to show in the records and to be of practical size, or, as clutter, hardly."""
+"""Size of a concealed effect: detectable and of practical size, or, as clutter, hardly detectable."""
 
 import math
 from collections.abc import Sequence
@@ -14,20 +14,26 @@ from rhythmid.proof.noise import Noise
 from rhythmid.proof.sizes import SIZES, Motion, Sized
 from rhythmid.proof.sizing import force_share, mismatch, strength_for
 
-FAINTEST, STRONGEST = 0.3, 10.0  # mismatch in units of the noise
-# A diagnosis calls what is below 0.3 % of the motion of no practical size; what is concealed has to be clearly above that.
-LEAST_MOTION = 0.005  # of the motion, rms
-LEAST_EFFORT, MOST_EFFORT = 0.01, 0.5  # of the effort, rms, where the mismatch is a force
+FAINTEST, STRONGEST = 0.3, 10.0  # limits of the mismatch in units of the noise
+# A diagnosis ignores effects below 0.3 % of the motion as of no practical size; a concealed effect must be clearly above that.
+LEAST_MOTION = 0.005  # smallest mismatch, rms as a share of the motion
+LEAST_EFFORT, MOST_EFFORT = (
+    0.01,
+    0.5,
+)  # limits of the mismatch, rms as a share of the effort, where it is a force
 CLUTTER = 3  # small effects beside the main one
-CLUTTER_SHARE = (0.005, 0.1)  # of the main one's mismatch
-NULL_CLUTTER = (3e-4, 1.5e-3)  # of the motion, each of the small effects where there is no main one
-NULL_CLUTTER_MOST = 3e-3  # of the motion, all together
-CLUTTER_CLOSE, CLUTTER_TRIES = 1.6, 4  # a small effect's size has to be met only roughly
+CLUTTER_SHARE = (0.005, 0.1)  # as a share of the main one's mismatch
+NULL_CLUTTER = (
+    3e-4,
+    1.5e-3,
+)  # as a share of the motion, for each of the small effects where there is no main one
+NULL_CLUTTER_MOST = 3e-3  # the same for all together
+CLUTTER_CLOSE, CLUTTER_TRIES = 1.6, 4  # tolerance factor and number of tries for a small effect's size
 
 
 @dataclass(frozen=True)
 class Concealed:
-    """An effect with the mismatch that it alone leaves: `ratio` in units of the noise, `share` of the motion or effort."""
+    """An effect and the mismatch that it alone causes: `ratio` in units of the noise, `share` of the motion or effort."""
 
     effect: Effect
     ratio: float
@@ -36,10 +42,10 @@ class Concealed:
 
 @dataclass(frozen=True)
 class Yardstick:
-    """Measures mismatches on a rig that lacks nothing, whose exact nominal model is `exact` with the free attributes `free`.
+    """Measures mismatches on a rig whose nominal model `exact` is complete; its attributes `free` are fitted.
 
-    `motion` is the rms of the measured motion [m], `noise` that of the noise in proportion to the motion, or to the effort
-    where mismatches are measured there (`by_effort`); `least` the share below which an effect is of no practical size.
+    `motion` is the rms of the measured motion [m]. `noise` is the rms of the noise relative to the motion, or to the effort where
+    mismatches are measured there (`by_effort`). `least` is the share below which an effect has no practical size.
     """
 
     rig: Rig
@@ -60,7 +66,7 @@ class Yardstick:
         by_effort: bool,
         plain: Sequence[Observation],
     ) -> "Yardstick":
-        """The yardstick of a rig that does what `plain` says when it conceals nothing."""
+        """The yardstick of a rig whose records without concealed effects are `plain`."""
         measured = [one.measured for one in plain]
         if rig.recorded == "base":
             measured = [y - run.command for y, run in zip(measured, rig.runs)]
@@ -70,7 +76,7 @@ class Yardstick:
         return cls(rig, exact, tuple(free), motion, share, by_effort, least)
 
     def share(self, effects: Sequence[Effect], nominal: Model | None = None, small: float = 1.0) -> float:
-        """The mismatch that these effects leave, of the motion or the effort; `small`: units of the noise that matter."""
+        """Mismatch caused by these effects, as a share of the motion or the effort; `small`: accuracy in units of the noise."""
         seen = self.rig.observe_all(effects)
         if self.by_effort:
             return force_share(self.rig, seen, self.free)
@@ -82,25 +88,25 @@ class Yardstick:
         return self.share(effects, nominal) / self.noise
 
     def lacking(self, rig: Rig, effects: Sequence[Effect] = ()) -> float:
-        """Share of the driving force that the believed machine of `rig` lacks of the real one with these effects."""
+        """Share of the driving force that the believed machine of `rig` lacks, compared with the real one with these effects."""
         return force_share(rig, rig.observe_all(effects), self.free)
 
     def joint(self, rig: Rig, effects: Sequence[Effect]) -> float:
-        """The mismatch of everything, in units of the noise, beside what the believed machine of `rig` lacks."""
+        """Mismatch of all effects together in units of the noise, including what the believed machine of `rig` lacks."""
         if rig.lacks is not None:
             return self.lacking(rig, effects) / self.noise
         return self.ratio(effects) if effects else 0.0
 
 
 def faintest(stick: Yardstick) -> float:
-    """The least mismatch, in units of the noise, that counts as concealed: it shows, and it is of practical size."""
+    """Smallest mismatch, in units of the noise, that counts as concealed: detectable and of practical size."""
     return max(FAINTEST, stick.least / stick.noise)
 
 
 def sized_effect(
     stick: Yardstick, name: str, sized: Sized, target: float, least: float, most: float
 ) -> Concealed | None:
-    """The effect at the strength that leaves the `target` in units of the noise; None where it comes out of bounds."""
+    """The effect with the strength that causes the mismatch `target` [units of the noise]; None where it is out of bounds."""
     strength, reached = strength_for(target, lambda s: stick.ratio([Effect(name, sized(s))]))
     if not least <= reached <= most:
         return None
@@ -110,9 +116,9 @@ def sized_effect(
 def put_clutter(
     rng: np.random.Generator, stick: Yardstick, motion: Motion, pool: Sequence[str], main: float | None
 ) -> tuple[Concealed, ...] | None:
-    """Three small effects beside one that leaves the share `main`, or beside none; one or two are not in the catalogue.
+    """Three small effects, one or two of them not in the catalogue; None where they cannot be made small.
 
-    None where they do not come out small.
+    `main` is the share of the main effect's mismatch, None where there is no main effect.
     """
     foreign = list(rng.permutation(list(FOREIGN)))
     ordinary = list(rng.permutation(list(pool)))

@@ -1,4 +1,4 @@
-"""A case drawn at random: a machine, experiments, delays, noise, a wrong nominal model, and what is concealed."""
+"""A randomly drawn case: a machine, experiments, delays, noise, a wrong nominal model, and the concealed effects."""
 
 import math
 from collections.abc import Sequence
@@ -31,19 +31,17 @@ from rhythmid.proof.sizing import with_shift
 Kind = Literal["single", "pairs", "null", "left-out"]
 KINDS: tuple[Kind, ...] = ("single", "null", "pairs", "left-out")
 ATTEMPTS = 20
-BEYOND = 1.2  # factor by which an effect may come out beyond the strongest that is asked for
-LACKED = (
-    "pendulum_gravity"  # part of a machine, not an effect that is added to it: a nominal model may lack it
-)
+BEYOND = 1.2  # factor by which an effect may exceed the largest requested size
+LACKED = "pendulum_gravity"  # part of a machine that a nominal model may lack, not an effect added to it
 
 
 @dataclass(frozen=True)
 class Case:
-    """All that is to know of a case. `absent` names what the catalogue is robbed of before diagnosis.
+    """All data of a case.
 
-    `concealed` are the effects that have to be named, `clutter` small ones beside them. `ratio` is the joint mismatch of all in
-    units of the noise, `nominal_error` the largest relative error of the nominal parameters, `nominal` the model that diagnosis
-    is given (YAML).
+    `absent` are the elements removed from the catalogue before the diagnosis. `concealed` are the effects to be named, `clutter`
+    small effects beside them. `ratio` is the joint mismatch of all in units of the noise. `nominal_error` is the largest relative
+    error of the nominal parameters. `nominal` is the model that the diagnosis is given (YAML).
     """
 
     name: str
@@ -63,12 +61,12 @@ class Case:
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """Everything that acts, clutter too."""
+        """All effects that act, including clutter."""
         return tuple(one.effect for one in (*self.concealed, *self.clutter))
 
     @property
     def true_parameters(self) -> dict[str, float]:
-        """True values of what the nominal model estimates, by its names; delays too."""
+        """True values of the parameters that the nominal model estimates, by name; including delays."""
         design = DESIGNS[self.design]
         values = {
             name: float(getattr(self.rig.machine, attribute))
@@ -79,13 +77,15 @@ class Case:
         return values | {f"{which}_delay.delay": delays[which] for which in design.delays}
 
     def observe(self, run: Run) -> Observation | None:
-        """The noise-free record of one run."""
+        """The noise-free record of one run; None where the machine diverges."""
         return self.rig.observe(self.effects, run)
 
 
 def candidates(catalogue: Catalogue, design: Design) -> list[tuple[str, ...]]:
-    """Classes of effects that a machine can conceal: the catalogue's candidates for which there is an equation here; effects
-    that make one and the same model form one class."""
+    """Classes of effects that a machine can conceal.
+
+    They are the catalogue's candidates that have an equation here. Effects that give the same model form one class.
+    """
     names = [
         name
         for name in (*SIZES, LACKED)
@@ -100,13 +100,12 @@ def candidates(catalogue: Catalogue, design: Design) -> list[tuple[str, ...]]:
     return classes
 
 
-# effects that, with others of the catalogue, make the same model: a friction that differs by direction is one that does not, and a
-# constant force
+# effects that are the sum of two others: a friction that differs by direction equals one that does not plus a constant force
 SUMS = {"asymmetric_coulomb_friction": ("constant_force",)}
 
 
 def related(catalogue: Catalogue, first: str, second: str) -> bool:
-    """Whether two effects are of one family, one is a special case of the other, or both together are a third."""
+    """Whether two effects are of one family, one is a special case of the other, or their sum is a third effect."""
     a, b = catalogue[first], catalogue[second]
     twins = any({first, second} <= group for group in EQUIVALENT)
     third = any(
@@ -120,8 +119,11 @@ def related(catalogue: Catalogue, first: str, second: str) -> bool:
 
 
 def absent_with(catalogue: Catalogue, name: str, alike: frozenset[str] = frozenset()) -> tuple[str, ...]:
-    """What must leave the catalogue so that `name` is unknown to it: itself, what is the same model (on a machine on which some
-    effects are `alike`) or makes it one with others, what contains it."""
+    """Elements to remove from the catalogue so that `name` is unknown to it.
+
+    They are the element itself; equivalent ones (on a machine for which the effects in `alike` are indistinguishable); those whose
+    sum with others is equivalent to it; and those that contain any of these.
+    """
     same = [group for group in (*EQUIVALENT, alike) if name in group]
     gone = {name, *SUMS.get(name, ())}.union(*same)
     gone |= {richer for one in tuple(gone) for richer in catalogue[one].special_case_of}
@@ -136,16 +138,16 @@ def draw_case(
     design: str = "hopper",
     cluttered: bool = False,
 ) -> Case:
-    """The case number `index` of a kind on one sort of machine: always the same for the same seed.
+    """The case number `index` of a kind on one type of machine, deterministic for a given seed.
 
-    Effects take turns in an order shuffled by the seed. Machines and experiments in which the effect would not show are
-    drawn anew.
+    Effects take turns in an order shuffled by the seed. Machines and experiments in which the effect would not be detectable are
+    drawn again.
     """
     known = catalogue or load_catalogue()
     made = DESIGNS[design]
     label = f"{kind}{'-cluttered' if cluttered else ''}-{design}-{index:04d}"
     stream = [seed, KINDS.index(kind), index]
-    # what tells one campaign from another comes last, so that a clean hopper is the one that it has always been
+    # seeds that distinguish campaigns come last, so that clean hopper cases are the same as in earlier versions
     apart = [list(DESIGNS).index(design), int(cluttered)] if design != "hopper" or cluttered else []
     names: list[str] = []
     for attempt in range(ATTEMPTS):
@@ -231,7 +233,7 @@ def _conceal(
     catalogue: Catalogue,
     rng: np.random.Generator,
 ) -> tuple[Concealed, ...] | None:
-    """The effects to be named, each of a size that shows; None where that cannot be had on this rig."""
+    """The effects to be named, each of a detectable size; None where this is impossible on this rig."""
     least, most = faintest(stick), MOST_EFFORT / stick.noise if stick.by_effort else STRONGEST
     if least > most:
         return None
@@ -247,7 +249,7 @@ def _conceal(
             return None
         concealed.append(found)
     added = [one.effect for one in concealed if one.effect != rig.lacks]
-    for effect in added if len(added) > 1 and not stick.by_effort else ():  # one may hide the other
+    for effect in added if len(added) > 1 and not stick.by_effort else ():  # one effect may mask the other
         beside = next(other for other in added if other is not effect)
         known = stick.exact.with_element(catalogue[beside.name], beside.parameters)
         if stick.ratio(added, known) < FAINTEST:

@@ -1,16 +1,17 @@
-"""The effects that the proof conceals, as plain equations: one entry an effect, written without the catalogue.
+"""The effects that the proof conceals, as plain equations: one entry for each effect, written without the catalogue.
 
-Nothing here is shared with the model that is fitted: dry friction turns its sign over a tenth of a millimetre a second (of
-a hopper; about a thousandth of the usual speed of other machines) by an algebraic sigmoid, play and rate limit are exact operators with a memory that moves between accepted steps, jumps stay
-jumps and are left to the step-size control. Every function changes the value of a signal at its place on the path
+No code is shared with the fitted model. Dry friction changes its sign by an algebraic sigmoid over a tenth of a millimetre a second
+(for a hopper; about a thousandth of the usual speed of other machines). Play and rate limit are exact operators, whose memory is
+updated between accepted steps. Jumps are exact and are left to the step-size control. Every function changes the value of a signal
+at its place on the path
 
     command u -> [command] -> + forcing -> [actuator] -> f,   spring and damper -> [leg] -> [contact],   f + leg -> [body]
     position -> [sensor] -> measured position
 
 and has the arguments (value, t, x, v, f, m, p, s, ds, held, accepted): time [s], position [m], velocity [m/s], actuator
 force [N], the machine's constants, the effect's parameters in the order declared, its states and (to be written) their
-rates, and memory that may be written only where a step has been `accepted`. On a base that is moved, x and v of what acts in
-the leg and its contact are relative to the base. Under a controller the command is its reference.
+rates, and memory that may be written only in a step that has been `accepted`. On a moved base, x and v of effects in the leg and
+its contact are relative to the base. Under a controller the command is its reference.
 """
 
 import math
@@ -20,19 +21,22 @@ from typing import Any
 
 from numba import njit
 
-# places in the constants m, see rhythmid.proof.machine.Machine
+# indices of the constants m, see rhythmid.proof.machine.Machine
 (
     MASS, STIFFNESS, DAMPING, REST_LENGTH, GRAVITY, AMPLITUDE, FREQUENCY, PHASE,
     RETURN, MOMENT, HANGING, PROPORTIONAL, DERIVATIVE, INTEGRAL, SLIDING, SENSED,
 ) = range(16)  # fmt: skip
 PLACES = ("command", "actuator", "leg", "contact", "body", "sensor")
-SWITCHING = 2e-4  # [m/s] half the speed over which a late damper sets in
+SWITCHING = 2e-4  # half the speed range over which a damper with a threshold sets in [m/s]
 
 
 @dataclass(frozen=True)
 class Equation:
-    """An effect's equation, its place on the path, the names of its parameters, whether each state starts at the
-    position (1) or at zero (0), and how many numbers it remembers."""
+    """An effect's equation.
+
+    `place` is its place on the path, `parameters` their names. `states` says whether each state starts at the position (1) or at
+    zero (0). `held` is the number of stored values.
+    """
 
     place: str
     function: Callable[..., Any]
@@ -45,7 +49,7 @@ EQUATIONS: dict[str, Equation] = {}
 
 
 def equation(place: str, *parameters: str, states: tuple[float, ...] = (), held: int = 0) -> Callable:
-    """Enter a function under its own name."""
+    """Register a function under its own name."""
 
     def enter(function: Callable) -> Callable:
         EQUATIONS[function.__name__] = Equation(place, function, parameters, states, held)
@@ -266,7 +270,7 @@ def ground_contact_loss(value, t, x, v, f, m, p, s, ds, held, accepted):
     return value * (1.0 - p[0]) if x > m[REST_LENGTH] else value
 
 
-# body: whatever acts on the mass past the leg
+# body: forces on the mass that do not act through the leg
 
 
 @equation("body", "stiffness", "damping_ratio", "position", "side")
@@ -327,7 +331,7 @@ def sensor_nonlinearity(value, t, x, v, f, m, p, s, ds, held, accepted):
     return value + p[0] * (value - p[1]) ** 2
 
 
-# outside the catalogue: nobody who looks for them knows their names
+# outside the catalogue: a diagnosis does not know their names
 
 
 @equation("body", "amplitude", "wavelength", "phase", "second", "second_phase")
@@ -353,7 +357,7 @@ def three_halves_drag(value, t, x, v, f, m, p, s, ds, held, accepted):
     return value - p[0] * v * math.sqrt(abs(v))
 
 
-# by the family of the catalogue that each would belong to
+# the family of the catalogue to which each would belong
 FOREIGN = {
     "two_harmonic_cogging": "ripple",
     "magnet": "stiffness",

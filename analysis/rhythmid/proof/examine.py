@@ -1,4 +1,4 @@
-"""Diagnosis of a case from what lies in its folder, the records and the nominal model, and from nothing else."""
+"""Diagnosis of a case that uses only the records and the nominal model in its folder."""
 
 import resource
 import time
@@ -15,19 +15,22 @@ from rhythmid.record.read import load_records
 
 
 def _processor_time() -> float:
-    """Seconds of processor time of this process and its finished children."""
+    """Processor time [s] of this process and its finished children."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used)
 
 
 def _records(folder: Path) -> list[Path]:
-    """Bags, and signals files that name tables."""
+    """Bags, and signals files of tables."""
     return sorted(path for path in folder.iterdir() if path.is_dir() or path.suffix == ".yaml")
 
 
 def examine(folder: Path, catalogue: Catalogue, budget: float | None = None) -> dict[str, Any]:
-    """The diagnosis, within a `budget` of seconds if one is given, as plain data, with `seconds`, `processor_seconds`, `phases` (seconds since the start, what began)
-    and the length of the held-out records' block averages. A failure is an answer too: `failure` holds its message."""
+    """The diagnosis as plain data, within a `budget` [s] if one is given.
+
+    Added are `seconds`, `processor_seconds`, `phases` (seconds since the start, step that began) and the length of the held-out
+    records' block averages. A failure is an answer, too: `failure` holds its message.
+    """
     began, used = time.monotonic(), _processor_time()
     phases: list[tuple[float, str]] = []
 
@@ -44,7 +47,7 @@ def examine(folder: Path, catalogue: Catalogue, budget: float | None = None) -> 
         answer = found.diagnosis.to_dict() | {"block": found.block, "evidence": found.ledger()}
     except InputError as error:
         answer = {"failure": f"refused: {error}"}
-    except Exception:  # a fault of ours is an answer, too, and a wrong one
+    except Exception:  # a fault in the diagnosis counts as a wrong answer
         answer = {"failure": traceback.format_exc()}
     spent = {"seconds": time.monotonic() - began, "processor_seconds": _processor_time() - used}
     return answer | spent | {"phases": phases}

@@ -1,7 +1,7 @@
 """The integrator of the concealed machines: rates of the whole signal path, and steps with error control.
 
-The embedded Runge-Kutta pair of J. R. Dormand and P. J. Prince (J. Comput. Appl. Math. 6 (1980) 19), restarted wherever the
-command has a knot. It shares no code with the simulator that is fitted.
+The embedded Runge-Kutta pair of J. R. Dormand and P. J. Prince (J. Comput. Appl. Math. 6 (1980) 19), restarted at every knot of
+the command. It shares no code with the simulator of the fitted models.
 """
 
 import warnings
@@ -32,16 +32,16 @@ from rhythmid.proof.equations import (
     STIFFNESS,
 )
 
-MOST_EFFECTS = 5  # effects at once: two, and three small ones beside them
-RELATIVE, ABSOLUTE = 1e-8, 1e-11  # error allowed in a step
-SHORTEST_STEP = 1e-8  # [s] step below which no accuracy is asked for: inside a jump
+MOST_EFFECTS = 5  # largest number of effects at once: two, and three small ones
+RELATIVE, ABSOLUTE = 1e-8, 1e-11  # error tolerances of a step
+SHORTEST_STEP = 1e-8  # [s] step below which the error is not controlled: inside a jump
 DIVERGED_POSITION = 1e3  # [m] beyond which the machine has diverged
-COLUMNS = 5  # of what is told of each sample: position, velocity, measured, concealed force, acceleration
+COLUMNS = 5  # values for each sample: position, velocity, measured, concealed force, acceleration
 
 COMMAND, ACTUATOR, LEG, CONTACT, BODY, SENSOR = range(len(PLACES))
 NOWHERE = -1
-# what the command is: a force, a moved base's displacement, the reference of a controller that works all the time, or of a
-# position or velocity controller that works at the command's knots
+# meaning of the command: a force, the displacement of a moved base, the reference of a continuous controller, or the reference of a
+# position or velocity controller that is updated at the command's knots
 FORCE, BASE, CONTINUOUS, SAMPLED_POSITION, SAMPLED_VELOCITY = range(5)
 numbers = float64[::1]
 SIGNATURE = float64(
@@ -58,7 +58,7 @@ def _nothing(value, t, x, v, f, m, p, s, ds, held, accepted):
 
 @lru_cache(maxsize=64)
 def compiled(name: str) -> Any:
-    """The equation `name` in machine code; that of "" changes nothing."""
+    """The compiled equation `name`; that of "" changes nothing."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
         return njit(SIGNATURE, cache=True)(EQUATIONS[name].function if name else _nothing)
@@ -96,7 +96,7 @@ def plain_leg(e, ev, m):
 def rates(t, z, u, du, mode, effects, places, layout, m, p, held, accepted, dz, told):
     """Write the rates of the states z = (x, v, …), and to `told` (1,) the force [N] that all effects together add.
 
-    `u` is the command in force and `du` its slope. Returns the measured position or velocity.
+    `u` is the present command and `du` its slope. Returns the measured position or velocity.
     """
     x, v, s, ds = z[0], z[1], z[2:], dz[2:]
     e, ev, f, plain = x, v, 0.0, 0.0
@@ -125,7 +125,7 @@ def rates(t, z, u, du, mode, effects, places, layout, m, p, held, accepted, dz, 
 
 @njit(types.UniTuple(float64, 2)(float64, int64, numbers, numbers, numbers, float64, boolean), cache=True)
 def command_at(t, j, knots, values, slopes, level, smooth):
-    """The command and its slope at t, after `j` knots have passed: held at `level`, or a cubic that meets both slopes."""
+    """The command and its slope at t, after `j` knots: held at `level`, or a cubic with the given slopes at both ends."""
     if not smooth or j == 0:
         return level, 0.0
     if j == len(knots):
@@ -148,9 +148,9 @@ def integrate(
 ):
     """Integrate from `begin` through all `samples`, filling the rows of `out`.
 
-    The command is `before` until the first of its `knots`, then values[j] from knots[j] on, or with as many `slopes` as knots a
-    smooth curve through them. `efforts` (knots,) become the forces that a sampled controller gives out at the knots. Returns
-    how many rows are good.
+    The command is `before` until the first of its `knots`, then values[j] from knots[j] on. With as many `slopes` as knots it is a
+    smooth curve through them. `efforts` (knots,) receives the forces of a sampled controller at the knots. Returns the number of
+    valid rows.
     """
     n = len(z)
     k1, k2, k3, k4 = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
@@ -174,7 +174,7 @@ def integrate(
             stop = samples[i]
             if j < len(knots) and knots[j] < stop:
                 stop = knots[j]
-            # the command may just have jumped: what remembers has to see it
+            # the command may just have jumped; effects with memory must be updated
             u, du = command_at(t, j, knots, values, slopes, level, smooth)
             rates(t, z, u, du, drive, effects, places, layout, m, p, held, True, k1, told)
             while t < stop:

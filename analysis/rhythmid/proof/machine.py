@@ -1,5 +1,7 @@
-"""The concealed machine: a mass or a joint with spring, damper and weight, perhaps under a controller or on a base that is
-moved, and up to five further effects. Its integrator is in `rhythmid.proof.integrator`."""
+"""The concealed machine: a mass or a joint with spring, damper and weight, and up to five further effects.
+
+It may have a controller or a moved base. Its integrator is in `rhythmid.proof.integrator`.
+"""
 
 import warnings
 from collections.abc import Sequence
@@ -30,18 +32,18 @@ MODES: dict[Mode, int] = {
     "force": FORCE, "base": BASE, "continuous": CONTINUOUS, "sampled_position": SAMPLED_POSITION,
     "sampled_velocity": SAMPLED_VELOCITY,
 }  # fmt: skip
-WARM_UP = 10.0  # [s] that a machine on its limit cycle has run before a record begins
+WARM_UP = 10.0  # [s] that a machine on its limit cycle runs before a record begins
 NO_SLOPES = np.empty(0)
 
 
 @dataclass(frozen=True)
 class Machine:
-    """The machine without effects, in SI units, linear or rotational, or in any that agree with each other.
+    """The machine without effects, in SI units, linear or rotational, or in any consistent units.
 
     Mass [kg], stiffness [N/m], damping while v > 0 [N s/m], rest length [m], gravity [m/s²] (0: it lies flat), damping while
-    v < 0 [N s/m] (a hopper has none in flight), moment of a pendulum's gravity [N m] and the angle at which it hangs [rad];
-    gains of the controller if there is one, on the error [N/m] (of a velocity controller [N s/m]), on the speed [N s/m] and
-    on the error's integral; `sliding` [m/s] is the speed over which dry friction turns, and `mode` says what the command is.
+    v < 0 [N s/m] (a hopper has none in flight), moment of a pendulum's gravity [N m] and the angle at which it hangs [rad].
+    Controller gains, if there is one: on the error [N/m] (of a velocity controller [N s/m]), on the speed [N s/m] and on the
+    error's integral. `sliding` [m/s] is the speed over which dry friction changes sign. `mode` is the meaning of the command.
     """
 
     mass: float
@@ -60,7 +62,7 @@ class Machine:
 
     @property
     def rest(self) -> float:
-        """Where a machine with a spring rests [m]; 0 for one without."""
+        """Rest position [m] of a machine with a spring; 0 for one without."""
         return self.rest_length - self.mass * self.gravity / self.stiffness if self.stiffness else 0.0
 
 
@@ -89,8 +91,11 @@ class Effect:
 
 @dataclass(frozen=True)
 class Observation:
-    """What a record holds, before noise: stamps [s] and values of the measurement, the force [N] that a sampled controller
-    gave out; for reference the motion itself and the force [N] that all effects together added."""
+    """A record before noise.
+
+    Stamps [s] and values of the measurement, and the force [N] of a sampled controller; for reference also the motion itself and
+    the force [N] that all effects together added.
+    """
 
     stamps: Array
     measured: Array
@@ -102,20 +107,20 @@ class Observation:
 
 
 def constants(machine: Machine, forcing: Forcing, velocity: bool = False) -> Array:
-    """The constants m of the equations; `velocity`: it is the velocity that is measured."""
+    """The constants m of the equations; `velocity`: the velocity is measured."""
     values = astuple(machine)
     return np.array([*values[:5], *astuple(forcing), *values[5:12], float(velocity)])
 
 
 def held_command(arrival: Array, value: Array, period: float) -> tuple[Array, Array]:
-    """What a drive makes of commands when it looks for a new one only at multiples of `period` [s]."""
+    """Command of a drive that takes a new command only at multiples of `period` [s]: instants and values."""
     ticks = period * np.arange(np.ceil(arrival[0] / period), np.ceil(arrival[-1] / period) + 1)
     newest = np.searchsorted(arrival, ticks + 1e-9, side="right") - 1
     return ticks[newest >= 0], value[newest[newest >= 0]]
 
 
 def stamp(taken: Array, delay: float, effects: Sequence[Effect]) -> Array:
-    """Stamps [s] of measurements by when they were taken [s]: late by the delay, on a clock that may run wrong."""
+    """Stamps [s] of measurements from the times [s] at which they were taken: late by the delay, from a clock that may be wrong."""
     stamps = taken + delay
     for effect in effects:
         if effect.name == "clock_skew":
@@ -125,7 +130,7 @@ def stamp(taken: Array, delay: float, effects: Sequence[Effect]) -> Array:
     return stamps
 
 
-TIMING = ("command_hold", "input_delay_drift", "clock_skew", "delay_drift")  # effects that are no equation
+TIMING = ("command_hold", "input_delay_drift", "clock_skew", "delay_drift")  # effects without an equation
 
 
 def observe(
@@ -143,12 +148,12 @@ def observe(
     samples: Array | None = None,
     lag: float = 0.0,
 ) -> Observation | None:
-    """Run the machine through one record.
+    """Run the machine through one record; None if it diverges.
 
-    `time` (n,) [s] are the instants at which commands (n,) [N] are sent and, but for other `samples`, measurements taken.
-    The command is held, or with `slopes` (n,) smooth. With a `start`, position [m] and velocity [m/s], the machine is let go there at the first instant;
-    else it has run before. `velocity`: it is the velocity that is measured. Measurements are taken `lag` [s] before they are
-    said to be. None if it diverges.
+    `time` (n,) [s] are the instants at which commands (n,) [N] are sent and, unless `samples` are given, measurements taken. The
+    command is held, or smooth with `slopes` (n,). With a `start`, position [m] and velocity [m/s], the machine is released there
+    at the first instant; otherwise it is already running. `velocity`: the velocity is measured. Measurements are taken `lag` [s]
+    before their nominal time.
     """
     taken = np.ascontiguousarray(time if samples is None else samples, dtype=float)
     arrival, value = time + input_delay, np.ascontiguousarray(command, dtype=float)
@@ -169,7 +174,7 @@ def observe(
     begin, (position, speed) = (time[0] - WARM_UP, (machine.rest, 0.0)) if start is None else (time[0], start)
     before = (
         position if machine.mode == "continuous" and start is not None else 0.0
-    )  # a servo stands where it was sent
+    )  # a servo starts at its first reference
     first = np.array([position, speed, *(share * position for one in known for share in one.states)])
     held = _memory(machine, inside, position, float(begin))
     out, efforts = np.empty((len(taken), COLUMNS)), np.zeros(len(arrival))
@@ -183,7 +188,7 @@ def observe(
         )  # fmt: skip
     if done < len(taken) or not np.isfinite(out).all():
         return None
-    efforts[-1:] = efforts[-2:-1]  # what is given out at the last sample acts after it
+    efforts[-1:] = efforts[-2:-1]  # the last output acts after the last sample
     return Observation(
         stamp(taken, measurement_delay, effects),
         out[:, 2],
@@ -196,7 +201,7 @@ def observe(
 
 
 def _memory(machine: Machine, effects: Sequence[Effect], position: float, begin: float) -> Array:
-    """What effects remember at first: nothing, but for a ramp of the reference, which begins where the machine is."""
+    """Initial memory of the effects: zero, except for a rate limit of the reference, which begins at the machine's position."""
     held: list[float] = []
     for effect in effects:
         ramp = effect.name == "reference_rate_limit"

@@ -1,4 +1,4 @@
-"""What sensors and loggers add: noise of three kinds, rounding, jittered stamps and rare outliers."""
+"""Errors added by sensors and loggers: noise of three kinds, rounding, jittered stamps and rare outliers."""
 
 import math
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from rhythmid.proof.machines.rig import log_uniform
 Array = NDArray[np.float64]
 NoiseKind = Literal["white", "coloured", "quantised"]
 NOISES: tuple[NoiseKind, ...] = ("white", "coloured", "quantised")
-FARTHEST_STAMP = 0.4  # sample periods that jitter may move a stamp by, so that stamps stay in order
+FARTHEST_STAMP = 0.4  # largest jitter of a stamp [sample periods]; stamps stay in order
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,10 @@ def coloured(white: Array, correlation: float) -> Array:
 
 @dataclass(frozen=True)
 class Log:
-    """How untidy a log is, beyond the sensor's noise; nothing by default.
+    """Errors of a log beyond the sensor's noise; none by default.
 
-    Stamps jitter by `jitter` sample periods rms; the measurement is rounded to `step` [m]; a share `outliers` of its samples is
-    off by `size` [m] or up to three times as much.
+    Stamps have a jitter of `jitter` sample periods rms. The measurement is rounded to `step` [m]. A share `outliers` of its samples
+    is wrong by `size` [m] or up to three times as much.
     """
 
     jitter: float = 0.0
@@ -60,7 +60,7 @@ class Log:
     size: float = 0.0
 
     def written(self, samples: Array, rng: np.random.Generator) -> Array:
-        """The samples as they stand in the log."""
+        """The samples as logged."""
         if not (self.step or self.outliers):
             return samples
         hit = rng.random(len(samples)) < self.outliers
@@ -70,7 +70,7 @@ class Log:
         return self.step * np.round(made / self.step) if self.step else made
 
     def stamped(self, stamps: Array, period: float, rng: np.random.Generator) -> Array:
-        """The stamps as they stand in the log; `period` [s] is that of the samples."""
+        """The stamps as logged; `period` [s] is that of the samples."""
         if not self.jitter:
             return stamps
         moved = self.jitter * rng.standard_normal(len(stamps))
@@ -83,7 +83,7 @@ def draw_noise(
     kind: NoiseKind | None = None,
     share: tuple[float, float] = (0.008, 0.03),
 ) -> Noise:
-    """Noise of a `share` of `size` [m], 0.8 to 3 % if not said otherwise."""
+    """Noise with an rms that is a `share` of `size` [m], by default 0.8 to 3 %."""
     std = size * log_uniform(rng, *share)
     kind = kind or NOISES[int(rng.choice(len(NOISES), p=[0.5, 0.3, 0.2]))]
     if kind == "coloured":
@@ -94,7 +94,7 @@ def draw_noise(
 
 
 def draw_log(rng: np.random.Generator, noise: Noise) -> Log:
-    """An untidy log of a measurement with this noise."""
+    """Log errors for a measurement with this noise."""
     return Log(
         jitter=log_uniform(rng, 0.02, 0.15),
         step=noise.std * rng.uniform(0.3, 2.0),

@@ -1,4 +1,4 @@
-"""The nominal model of a machine, as somebody would write it: what is known is fixed, the rest has to be estimated."""
+"""The nominal model of a machine as a user would write it: known values are fixed, the others have to be estimated."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -10,7 +10,7 @@ import yaml
 from rhythmid.proof.machine import Machine
 from rhythmid.proof.machines.rig import Design, Rig, log_uniform
 
-FARTHEST, NEAREST = 0.5, 0.05  # how wrong unknown values may be, relatively
+FARTHEST, NEAREST = 0.5, 0.05  # limits of the relative error of unknown values
 
 
 def free_attributes(design: Design, known: Collection[str] = ()) -> list[str]:
@@ -79,7 +79,7 @@ def nominal_model(
 
 
 def wrong(machine: Machine, rng: np.random.Generator, names: Collection[str]) -> tuple[Machine, float]:
-    """The machine as somebody believes it to be: the attributes `names` are 5 to 50 % off."""
+    """The machine with wrong values, and the largest relative error: the attributes `names` are 5 to 50 % off."""
     level = log_uniform(rng, NEAREST, FARTHEST)
     values, worst = {}, 0.0
     for name in names:

@@ -1,5 +1,7 @@
-"""A drawn case becomes what a robot leaves behind: bags with the contract's topics, or tables and what their columns are, and
-somebody's nominal model."""
+"""Write a drawn case as data of a robot and its user.
+
+The records are bags with the contract's topics, or tables with a description of their columns; the nominal model is a file.
+"""
 
 import math
 from collections.abc import Sequence
@@ -19,10 +21,10 @@ from rhythmid.record.bag_writer import write_bag
 from rhythmid.record.messages import Messages
 
 Array = NDArray[np.float64]
-BLOCKS = range(1, 21)  # lengths of block averages for which the noise floor is noted
-LEARN, JUDGE, NOMINAL = "learn", "judge", "nominal.yaml"  # what lies in a case's folder
-TEXT_UP_TO = 500  # [Hz] of a table that is written as text
-EFFORT_COLOUR = 0.8  # correlation of an untidy log's effort noise from sample to sample
+BLOCKS = range(1, 21)  # lengths of block averages for which the noise floor is stored
+LEARN, JUDGE, NOMINAL = "learn", "judge", "nominal.yaml"  # content of a case's folder
+TEXT_UP_TO = 500  # [Hz] highest rate of a table that is written as text
+EFFORT_COLOUR = 0.8  # correlation between neighbouring samples of the effort noise in an untidy log
 
 
 def perform(case: Case, folder: Path, seed: Sequence[int]) -> dict[int, float]:
@@ -42,9 +44,9 @@ def perform(case: Case, folder: Path, seed: Sequence[int]) -> dict[int, float]:
 
 
 def _seen(case: Case, run: Run, rng: np.random.Generator) -> tuple[Observation, Array]:
-    """The noise-free record and what its log says was measured."""
+    """The noise-free record, and the logged measurement."""
     seen = case.observe(run)
-    assert seen is not None  # the case was drawn so
+    assert seen is not None  # cases that diverge were not drawn
     return seen, case.log.written(case.noise.corrupt(seen.measured, rng), rng)
 
 
@@ -66,7 +68,7 @@ def _bag(case: Case, run: Run, path: Path, rng: np.random.Generator) -> tuple[Ar
 
 
 def _table(case: Case, run: Run, path: Path, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Write one table and the signals file that tells its columns; returns its measurement and the noise in it."""
+    """Write one table and the signals file with its columns; returns its measurement and the noise in it."""
     seen, measured = _seen(case, run, rng)
     rig = case.rig
     force, position = rig.units

@@ -1,7 +1,7 @@
-"""Experiments drawn at random: what a careful experimenter might record, never twice the same.
+"""Randomly drawn experiments, such as a careful experimenter might record.
 
-Amplitudes are in units of the forcing's. Every set holds a multisine that repeats, a large chirp and the limit cycle
-alone; the rest is drawn.
+Amplitudes are in units of the forcing's. Every set contains a repeated multisine, a large chirp and the limit cycle alone; the rest
+is drawn.
 """
 
 from dataclasses import dataclass, replace
@@ -12,16 +12,24 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 RATE = 1000  # [Hz]
-NEARBY = 1e-5  # [s] over which the rate of a smooth command is taken
-PUMPING = (0.7, 0.8, 1.0, 1.25, 1.5, 1.6, 2.0)  # [Hz] at which a multisine can repeat with the forcing
+NEARBY = 1e-5  # [s] step of the differences for the rate of a smooth command
+PUMPING = (
+    0.7,
+    0.8,
+    1.0,
+    1.25,
+    1.5,
+    1.6,
+    2.0,
+)  # [Hz] at which a multisine can have a common period with the forcing
 
 
 @dataclass(frozen=True)
 class Run:
     """One record to be made: its name, duration [s], the forcing's scale, and the command's shape with its numbers.
 
-    `rate` [Hz] is that of commands and measurements; `start`, position [m] and velocity [m/s], is where the machine is let go,
-    None where it has run before.
+    `rate` [Hz] is that of commands and measurements. `start`, position [m] and velocity [m/s], is where the machine is released;
+    None where it is already running.
     """
 
     name: str
@@ -73,7 +81,7 @@ def _tones(time: Array, sizes: list[float], frequencies: list[float], phases: li
 
 
 def _moves(time: Array, times: list[float], places: list[float]) -> Array:
-    """From place to place with quintic profiles; equal neighbours are pauses."""
+    """Moves between places with quintic profiles; equal neighbours are pauses."""
     knots, values = np.array(times), np.array(places)
     i = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
     s = np.clip((time - knots[i]) / (knots[i + 1] - knots[i]), 0.0, 1.0)
@@ -81,7 +89,7 @@ def _moves(time: Array, times: list[float], places: list[float]) -> Array:
 
 
 def _speeds(time: Array, times: list[float], places: list[float]) -> Array:
-    """Speeds of such moves."""
+    """Velocities of such moves."""
     knots, values = np.array(times), np.array(places)
     i = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
     span = knots[i + 1] - knots[i]
@@ -100,7 +108,7 @@ def draw_tones(
     rng: np.random.Generator, name: str, rms: float, low: float, high: float, duration: float, rate: int,
     count: int = 12, falls: float = 0.0, start: Start | None = (0.0, 0.0),
 ) -> Run:  # fmt: skip
-    """Sines between two frequencies [Hz], together of `rms` [N], single ones falling with the power `falls` of frequency."""
+    """Sines between two frequencies [Hz], together of `rms` [N]; the amplitude of each falls with the power `falls` of frequency."""
     frequencies = np.geomspace(low, high, count) * rng.uniform(0.94, 1.06, count)
     sizes = frequencies**-falls
     sizes *= rms / np.sqrt(0.5 * np.sum(sizes**2))
@@ -113,9 +121,9 @@ def draw_moves(
     rng: np.random.Generator, name: str, places: tuple[float, float], duration: float, rate: int,
     quickest: float = 0.4, slowest: float = 1.5, pause: float = 0.5, speeds: bool = False,
 ) -> Run:  # fmt: skip
-    """Moves between random places [m], each of `quickest` to `slowest` [s], with pauses of up to `pause` [s]; or their speeds.
+    """Moves between random places [m], each of `quickest` to `slowest` [s], with pauses of up to `pause` [s]; or their velocities.
 
-    They begin where the machine rests, at the middle of the places.
+    They begin at the machine's rest position, in the middle of the places.
     """
     times, stops = [0.0], [0.5 * (places[0] + places[1])]
     while times[-1] < duration:
@@ -137,12 +145,12 @@ def draw_sweep(
 
 
 def from_reference(run: Run) -> Run:
-    """The same record, begun where its command, a position, begins."""
+    """The same record, started at the first value of its command, a position."""
     return replace(run, start=(float(run.command[0]), 0.0))
 
 
 def draw_release(name: str, start: Start, duration: float, rate: int) -> Run:
-    """Let go at `start`, and nothing else."""
+    """A release at `start` without a command."""
     return Run(name, duration, 1.0, "silence", {}, rate, start)
 
 
@@ -189,7 +197,7 @@ def _draw_steps(rng: np.random.Generator, name: str, unit: float) -> Run:
 def draw_runs(
     rng: np.random.Generator, unit: float, natural: float, pumping: float
 ) -> tuple[tuple[Run, ...], tuple[Run, ...]]:
-    """Three to six records to learn from and two to judge by.
+    """Three to six records to fit and two to judge by.
 
     `unit` [N] is the forcing's amplitude, `natural` [Hz] the machine's frequency, `pumping` [Hz] the forcing's.
     """

@@ -11,7 +11,7 @@ from rhythmid.statistics import NORMAL_95
 
 @dataclass(frozen=True)
 class Rate:
-    """So many of so many, with the 95 % interval of E. B. Wilson (J. Am. Stat. Assoc. 22 (1927) 209)."""
+    """A count out of a total, with the 95 % interval of E. B. Wilson (J. Am. Stat. Assoc. 22 (1927) 209)."""
 
     hits: int
     of: int
@@ -41,5 +41,5 @@ class Rate:
 
 
 def rate(scores: Sequence[Score], holds: Callable[[Score], bool]) -> Rate:
-    """How many of the scores something holds for."""
+    """The rate of scores for which `holds` is true."""
     return Rate(sum(map(holds, scores)), len(scores))

@@ -1,4 +1,4 @@
-"""Are stated probabilities right as often as they say? The data of a reliability diagram."""
+"""Reliability diagram: are stated probabilities as often right as they say?"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,7 +10,7 @@ EDGES = (0.0, 0.5, 0.7, 0.85, 0.95, 1.0)
 
 
 def binned(scores: Sequence[Score]) -> list[tuple[tuple[float, float], list[Stated]]]:
-    """All names that answers state, whatever their verdict, by probability; a bin's upper edge belongs to the next one."""
+    """All names in answers, whatever the verdict, by probability; a bin's upper edge belongs to the next bin."""
     stated = [one for score in scores for one in score.stated]
     bins = list(zip(EDGES, EDGES[1:]))
     return [
@@ -23,7 +23,7 @@ def binned(scores: Sequence[Score]) -> list[tuple[tuple[float, float], list[Stat
 
 
 def reliability(scores: Sequence[Score]) -> list[dict[str, Any]]:
-    """By bin: mean stated probability, how many names were right with Wilson's interval, and whether the mean is in it."""
+    """For each bin: mean stated probability, rate of correct names with Wilson's interval, and whether the mean is within it."""
     found: list[dict[str, Any]] = []
     for (low, high), some in binned(scores):
         right = Rate(sum(one.right for one in some), len(some))
@@ -34,7 +34,7 @@ def reliability(scores: Sequence[Score]) -> list[dict[str, Any]]:
 
 
 def reliability_lines(scores: Sequence[Score]) -> list[str]:
-    """The same as lines of Markdown; none where nothing was stated."""
+    """The same as lines of Markdown; empty where nothing was stated."""
     if not any(score.stated for score in scores):
         return []
     lines = ["", "## Stated probabilities", "", "| stated | mean | right |", "| --- | --- | --- |"]

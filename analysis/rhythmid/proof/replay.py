@@ -1,7 +1,7 @@
-"""Answers that were kept, held against the opened seals once more: nothing is drawn and nothing simulated.
+"""Score stored answers again against the opened seals, without drawing or simulating.
 
-Where an answer holds the evidence that it was reached by, the verdict is reached anew from it, so that a change of the
-verdict's rules is measured on every case that was ever done.
+Where an answer contains its evidence, the verdict is derived from it again. A change of the verdict's rules can so be measured on
+every case that was ever run.
 """
 
 import json
@@ -21,7 +21,7 @@ EVIDENCE = "evidence"
 
 
 def told_hashes(out: Path) -> dict[str, str]:
-    """Hashes of the truths by case, as they were told before the diagnosis; the last one counts."""
+    """Hashes of the truths by case, as reported before the diagnosis; the last one counts."""
     path = out / "seals.txt"
     if not path.exists():
         return {}
@@ -30,9 +30,9 @@ def told_hashes(out: Path) -> dict[str, str]:
 
 
 def replay_campaign(out: Path, campaign: Campaign, tasks: Sequence[Task]) -> tuple[list[Score], int]:
-    """Score the kept answers of these cases, and write `replay.md` and `replay.json` beside the campaign's own card.
+    """Score the stored answers of these cases, and write `replay.md` and `replay.json` beside the campaign's own card.
 
-    Returns the scores and how many verdicts were reached anew. Raises InputError where no answer was kept.
+    Returns the scores and the number of verdicts that were derived again. Raises InputError where no answer was stored.
     """
     told, catalogue = told_hashes(out), load_catalogue()
     scores: list[Score] = []

@@ -1,4 +1,4 @@
-"""The answer held against the opened truth."""
+"""Score of an answer against the opened truth."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -12,9 +12,9 @@ from rhythmid.proof.equations import FOREIGN
 from rhythmid.proof.machines.designs import DESIGNS
 
 Outcome = Literal["exact", "family", "wrong", "unknown", "undecided", "consistent", "failed"]
-FAMILY = 2  # members that a declared family may have
+FAMILY = 2  # largest number of members of a declared family
 ANGLES = ("phase",)
-SURE = 0.8  # probability from which on an answer stands by a name
+SURE = 0.8  # probability from which an answer states a name
 NO_SINGLE_DELAY = {"command_hold", "input_delay_drift", "delay_drift", "clock_skew"}
 
 
@@ -38,9 +38,13 @@ class Estimated:
 
 @dataclass(frozen=True)
 class Stated:
-    """A name that an answer states, with its probability, and whether it is right: concealed; or declared indistinguishable from
-    that, in a family of two or as its special case; or clutter that is really there, or of the same family of the catalogue as such clutter, for much
-    of which there is no name. `related`: of the catalogue's family of something that was concealed."""
+    """A name stated by an answer, with its probability.
+
+    `right` is true in three cases. The name was concealed. The answer declares it indistinguishable from a concealed effect,
+    in a family of two or because the name is its special case. Or it names clutter that was present, or a law of the same
+    family as such clutter, for much of which the catalogue has no name. `related`: the name is of the same family as a
+    concealed effect.
+    """
 
     name: str
     probability: float
@@ -50,12 +54,13 @@ class Stated:
 
 @dataclass(frozen=True)
 class Score:
-    """How one case came out.
+    """The score of one case.
 
-    `outcome` exact: named what was concealed, and nothing but perhaps clutter that is really there; family: named, or declared
-    indistinguishable from what was named, in a family of two or as the richer law; wrong: something else named. `dominant_first`: what explains most
-    was concealed. `heldout` is the held-out error over the noise floor; None where the effort was scored or an effort was recorded. `kinds`
-    are the families that are said to be missing, that with the largest share first.
+    `outcome` is "exact" if all concealed effects were named, and besides them only clutter that was present or its relatives. It is
+    "family" if they were named or declared indistinguishable from a named effect, in a family of two or as the richer law. It is
+    "wrong" if anything else was named. `dominant_first`: the name with the largest share was concealed. `heldout` is the ratio of the
+    held-out error to the noise floor; None where the effort was scored or recorded. `kinds` are the families reported as missing, the
+    largest share first.
     """
 
     case: str
@@ -86,41 +91,41 @@ class Score:
 
     @property
     def kinds_stated(self) -> tuple[Stated, ...]:
-        """Families that the answer stands by."""
+        """Families that the answer states."""
         return tuple(one for one in self.kinds if one.probability >= SURE)
 
     @property
     def kind_right(self) -> bool:
-        """Whether the family with the largest share is stated, and something of it was concealed."""
+        """Whether the family with the largest share is stated, and an effect of it was concealed."""
         return bool(self.kinds) and self.kinds[0].probability >= SURE and self.kinds[0].related
 
     @property
     def stated_wrong(self) -> tuple[str, ...]:
-        """Names that the answer stands by and that are wrong."""
+        """Names that the answer states and that are wrong."""
         return tuple(one.name for one in self.stated if one.probability >= SURE and not one.right)
 
     @property
     def stated_unrelated(self) -> tuple[str, ...]:
-        """Of these names those of another family than all that was concealed."""
+        """Those of these names whose family is that of no concealed effect."""
         return tuple(
             one.name for one in self.stated if one.probability >= SURE and not (one.right or one.related)
         )
 
     @property
     def group(self) -> str:
-        """The line of the card that the case belongs to."""
+        """The row of the score card to which the case belongs."""
         return f"{self.kind}, cluttered" if self.cluttered else self.kind
 
     @property
     def honest(self) -> bool:
-        """Whether an effect that the catalogue lacks was not given a confident wrong name."""
+        """Whether no wrong name was stated with confidence for an effect that the catalogue lacks."""
         return self.outcome in ("unknown", "undecided") or (
             self.verdict == "missing_physics" and bool(self.families)
         )
 
     @property
     def false_alarm(self) -> bool:
-        """Whether something was claimed to be missing."""
+        """Whether missing physics was reported."""
         return self.verdict in ("missing_physics", "unknown_physics")
 
     @property
@@ -129,7 +134,7 @@ class Score:
 
 
 def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -> Score:
-    """Compare an answer with the truth; the whole `catalogue` says in which slot an effect is."""
+    """Compare an answer with the truth; the complete `catalogue` gives the slot of each effect."""
     concealed = truth["concealed"]
     true = tuple(sorted(one["effect"]["name"] for one in concealed))
     named = tuple(sorted(effect["element"] for effect in answer.get("missing", ())))
@@ -187,7 +192,7 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
 def _kinds(
     answer: dict[str, Any], true: Sequence[str], clutter: Sequence[str], catalogue: Catalogue
 ) -> tuple[Stated, ...]:
-    """Families that are said to be missing; right where something of them was concealed or is clutter, related where it was concealed."""
+    """Families reported as missing: right if a concealed effect or clutter is of the family, related if a concealed one is."""
     hidden, there = _families_of(true, catalogue), _families_of((*true, *clutter), catalogue)
     return tuple(
         Stated(one["family"], float(one["probability"]), one["family"] in there, one["family"] in hidden)
@@ -196,12 +201,12 @@ def _kinds(
 
 
 def _families_of(names: Sequence[str], catalogue: Catalogue) -> set[str]:
-    """Families of effects, of which some are not in the catalogue."""
+    """Families of effects; some of the effects are not in the catalogue."""
     return {FOREIGN[name] if name in FOREIGN else catalogue[name].family for name in names}
 
 
 def _ranked(answer: dict[str, Any]) -> list[dict[str, Any]]:
-    """What is said to be missing, by the share that it explains where shares are told."""
+    """The effects reported as missing, sorted by the share that they explain if all shares are given."""
     missing = list(answer.get("missing", ()))
     if all(effect.get("share") is not None for effect in missing):
         missing.sort(key=lambda effect: -effect["share"])
@@ -209,13 +214,16 @@ def _ranked(answer: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _all_alike(true: tuple[str, ...], families: tuple[tuple[str, ...], ...], alike: frozenset[str]) -> bool:
-    """Whether an answer does not decide between effects that no record of the machine tells apart, the true one among them."""
+    """Whether an answer only leaves open effects that no record of the machine separates, the true ones among them."""
     return bool(true) and any(set(true) <= set(group) <= alike for group in families)
 
 
 def _declared(name: str, families: tuple[tuple[str, ...], ...], catalogue: Catalogue) -> set[str]:
-    """What a name stands for: itself; the element of a place that a law of its family was moved to, which is the same law; the other one
-    of a family of two, and richer laws that contain it, as far as the answer declares that it cannot tell them apart."""
+    """The effects for which a name counts.
+
+    They are the effect itself; the element of the slot to which a law of its family was moved, which is the same law; and, if the
+    answer declares them indistinguishable, the other member of a family of two and richer laws that contain it.
+    """
     groups = [set(group) for group in families if name in group]
     richer = set(catalogue[name].special_case_of) if name in catalogue else set()
     same = {one.name for one in catalogue.values() for kin in catalogue.values() if _moved_to(one, kin, name)}
@@ -223,7 +231,7 @@ def _declared(name: str, families: tuple[tuple[str, ...], ...], catalogue: Catal
 
 
 def _moved_to(one: Element, kin: Element, name: str) -> bool:
-    """Whether `name` is that of `kin`, a law of the family and with the parameters of `one`, moved to the place of `one`."""
+    """Whether `name` is the name of `kin` moved to the slot of `one`, where both have the same family and parameters."""
     parameters = [[(parameter.name, parameter.unit) for parameter in each.parameters] for each in (one, kin)]
     alike = one.family == kin.family != "" and parameters[0] == parameters[1]
     return alike and name == moved_name(kin.name, one.slot)
@@ -256,18 +264,18 @@ def _outcome(
 
 
 def _kin_of(clutter: Sequence[str], catalogue: Catalogue) -> set[str]:
-    """Names of the catalogue that are of the family of any of these effects, of which some are not in the catalogue."""
+    """Names of the catalogue in the families of these effects; some of the effects are not in the catalogue."""
     families = _families_of(clutter, catalogue)
     return {*clutter, *(name for name, one in catalogue.items() if one.family and one.family in families)}
 
 
 def by_effort(answer: dict[str, Any]) -> bool:
-    """Whether the answer was reached by comparing forces."""
+    """Whether the answer is from effort scoring."""
     return (answer.get("scoring") or {}).get("kind") == "effort"
 
 
 def _heldout(truth: dict[str, Any], answer: dict[str, Any]) -> float | None:
-    # the noise of a recorded effort moves the free run, so that its held-out error is not a figure of the model
+    # the noise of a recorded effort drives the free run, so that its held-out error does not measure the model
     if by_effort(answer) or (truth.get("rig") or {}).get("recorded") == "effort":
         return None
     error = ((answer.get("fit") or {}).get("augmented") or {}).get("heldout_nrmse")
@@ -282,7 +290,7 @@ def _estimated(name: str, true: float, given: dict[str, Any] | None) -> list[Est
 
 
 def _effect_estimates(truth: dict[str, Any], answer: dict[str, Any]) -> tuple[Estimated, ...]:
-    """Parameters that both descriptions of an effect have; how sharply a friction turns is nobody's parameter."""
+    """Parameters that both descriptions of an effect have; the smoothing speed of a friction is in only one of them."""
     found: list[Estimated] = []
     given = {effect["element"]: effect["parameters"] for effect in answer["missing"]}
     for one in (*truth["concealed"], *truth["clutter"]):

@@ -1,4 +1,4 @@
-"""The truth of a case, sealed in a file before the diagnosis: only its hash is told."""
+"""The truth of a case, sealed in a file before the diagnosis: only its hash is published."""
 
 import hashlib
 import json
@@ -12,8 +12,11 @@ from rhythmid.proof.draw import Case
 
 
 def truth_of(case: Case, floors: dict[int, float]) -> dict[str, Any]:
-    """Everything about a case as plain data; `floors` is the held-out records' noise as nrmse, by block length, and
-    `parameters` the true values of the nominal model's."""
+    """All data of a case as plain data.
+
+    `floors` is the relative noise of the held-out records, by block length; `parameters` are the true values of the nominal
+    model's parameters.
+    """
     return asdict(case) | {
         "floors": {str(block): floor for block, floor in floors.items()},
         "parameters": case.true_parameters,
@@ -33,7 +36,7 @@ def digest(path: Path) -> str:
 
 
 def unseal(path: Path, told: str) -> dict[str, Any]:
-    """The truth. Raises InputError when it is not the one whose hash was told."""
+    """The truth. Raises InputError when its hash is not the published one."""
     if digest(path) != told:
         raise InputError(f"{path}: the seal is broken, its hash is not the one written before the diagnosis")
     return json.loads(path.read_text(encoding="utf-8"))

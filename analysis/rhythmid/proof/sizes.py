@@ -1,7 +1,6 @@
-"""How large each concealed effect may be, and its other parameters: drawn at random within what is physical.
+"""Sizes and other parameters of each concealed effect, drawn at random within physical limits.
 
-An effect's `strength` runs from 0 (absent) to 1 (as much as any machine would have); which strength is taken is settled
-later by the mismatch that it leaves.
+An effect's `strength` runs from 0 (absent) to 1 (as large as on any machine). It is chosen later by the mismatch that it causes.
 """
 
 import math
@@ -21,10 +20,10 @@ Sized = Callable[[float], dict[str, float]]  # strength -> parameters
 
 @dataclass(frozen=True)
 class Motion:
-    """What the machine does in the experiments without the effect: the yardstick of every effect."""
+    """Scales of the machine's motion in the experiments without the effect, for the sizes of effects."""
 
     machine: Machine
-    stiffness: float  # [N/m] of the spring; of a machine without one, the unit of force over that of position
+    stiffness: float  # [N/m] of the spring; without a spring, ratio of the units of force and position
     damping: float  # [N s/m] of the damper
     unit: float  # amplitude of the forcing [N], or rms of the driving force
     natural: float  # natural angular frequency [rad/s]
@@ -32,7 +31,7 @@ class Motion:
     position: float  # standard deviation [m] over all records
     velocity: float  # [m/s]
     cycle: float  # amplitude of the limit cycle [m]
-    low: float  # [m] ends of the motion, a thousandth of the time left out
+    low: float  # [m] limits of the motion, without a thousandth of the time
     high: float
     centre: float
     stretch: float  # largest |x - rest length| [m]
@@ -44,10 +43,10 @@ class Motion:
 
 
 def motion_of(machine: Machine, forcing: Forcing, runs: tuple[Run, ...], seen: list[Observation]) -> Motion:
-    """Sizes of the motion in the records `seen`, which came of `runs`."""
+    """Scales of the motion in the records `seen`, which resulted from `runs`."""
     x = np.concatenate([one.position for one in seen])
     v = np.concatenate([one.velocity for one in seen])
-    if machine.mode == "base":  # what acts in the leg sees the motion relative to the base
+    if machine.mode == "base":  # effects in the leg depend on the motion relative to the base
         x = x - np.concatenate([run.command for run in runs])
         v = v - np.concatenate([run.slopes for run in runs])
     efforts = [drive_of(machine, forcing, run, one) for run, one in zip(runs, seen)]
@@ -83,8 +82,10 @@ def motion_of(machine: Machine, forcing: Forcing, runs: tuple[Run, ...], seen: l
 
 
 def drive_of(machine: Machine, forcing: Forcing, run: Run, seen: Observation) -> Array:
-    """The force [N] that drives the machine in a record: command and forcing, what a controller gives out, or where nothing
-    does, the force that the moving mass takes."""
+    """The force [N] that drives the machine in a record.
+
+    Command and forcing, or a controller's output; where nothing drives it, the inertial force of the moving mass.
+    """
     if machine.mode in ("sampled_position", "sampled_velocity"):
         return seen.effort
     if machine.mode == "continuous":
@@ -103,12 +104,12 @@ def _log(rng: Rng, low: float, high: float) -> float:
 
 
 def _of(size: str, largest: float, **others: float) -> Sized:
-    """Size in proportion to the strength."""
+    """Parameters with the size proportional to the strength."""
     return lambda strength: {size: largest * strength, **others}
 
 
 def _limit(size: str, peak: float, lowest: float) -> Sized:
-    """A limit that comes down from the peak of what it limits."""
+    """Parameters of a limit that decreases from the peak of the limited signal with the strength."""
     return lambda strength: {size: peak * (1.0 - (1.0 - lowest) * strength)}
 
 
@@ -116,7 +117,7 @@ def _torque_speed_limit(rng: Rng, m: Motion) -> Sized:
     slope = m.effort / m.velocity * _log(rng, 0.3, 3.0)
 
     def sized(strength: float) -> dict[str, float]:
-        # from where the largest force is left at three times the usual speed down to where half of it is at none
+        # from a limit that passes the largest force at three times the usual speed, to one that passes half of it at standstill
         fastest, slowest = 3.0 * m.velocity + m.effort / slope, 0.5 * m.effort / slope
         return {"speed": fastest + (slowest - fastest) * strength, "slope": slope}
 
@@ -233,5 +234,5 @@ SIZES: dict[str, Callable[[Rng, Motion], Sized]] = {
     "three_halves_drag": lambda rng, m: _of("coefficient", 2.0 * m.damping / math.sqrt(m.velocity)),
 }  # fmt: skip
 
-# Classes of one and the same model: a case draws one of them, and no record can tell which.
+# Classes of observationally equivalent effects: a case draws one of them, and no record can separate them.
 EQUIVALENT = (frozenset({"viscous_damper", "flight_damping"}), frozenset({"clock_skew", "delay_drift"}))

@@ -1,9 +1,9 @@
-"""The mismatch that a concealed effect leaves once the nominal model is refitted, and the strength that leaves a given one.
+"""The mismatch that a concealed effect causes after refitting the nominal model, and the strength for a given mismatch.
 
-The one place where the proof uses the estimator: to know the size of what it conceals, before anything is sealed. Where a
-free run means little, the mismatch is a force: what the effects add to the truth's motion, less what the nominal model's
-free parameters absorb of it, by plain linear least squares. What a shift of the input and the motion against each other
-absorbs is left out of either, for no record tells it from a lag as short.
+This is the only place where the proof uses the estimator: to measure the size of a concealed effect before the case is sealed. Where
+a free run is not meaningful, the mismatch is a force: what the effects add along the true motion, less what the nominal model's free
+parameters absorb by linear least squares. The part that a relative shift of input and motion absorbs is excluded in both cases,
+because no record separates it from an equally short lag.
 """
 
 import math
@@ -28,12 +28,12 @@ from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
-AVERAGED = 200  # [Hz] to which samples are averaged
-STEP = 6.25e-4  # [s] of the fit's integrator: its error must not pass for a mismatch
-SIZE_TOLERANCE = 1.25  # factor within which a mismatch is the one asked for
+AVERAGED = 200  # [Hz] rate to which samples are averaged
+STEP = 6.25e-4  # [s] step of the fit's integrator, so short that its error is no mismatch
+SIZE_TOLERANCE = 1.25  # tolerance factor of a mismatch
 TRIES = 7
-SHIFT = 2.0  # samples by which input and motion may be logged apart: nobody knows their clocks better before
-HELD = 0.5  # samples that a held input, which the machine sees as a smooth one, comes later
+SHIFT = 2.0  # samples by which the clocks of input and motion may differ: they are not known better
+HELD = 0.5  # samples by which a held input is late, relative to the smooth one that the machine sees
 
 
 def record_of(rig: Rig, run: Run, seen: Observation) -> Record:
@@ -55,8 +55,10 @@ def record_of(rig: Rig, run: Run, seen: Observation) -> Record:
 
 
 def mismatch(nominal: Model, rig: Rig, seen: Sequence[Observation] | None, scale: float) -> float:
-    """Rms [m] that the nominal model leaves of the noise-free learning records `seen` after a refit from its own values;
-    infinite where it cannot follow them. `scale` [m] is what counts as small."""
+    """Rms residual [m] of the nominal model on the noise-free records `seen`, after a refit from its own values.
+
+    Infinite where it cannot follow them. `scale` [m] is the accuracy needed.
+    """
     if seen is None:
         return math.inf
     records = [record_of(rig, run, one) for run, one in zip(rig.runs, seen)]
@@ -79,7 +81,7 @@ def mismatch(nominal: Model, rig: Rig, seen: Sequence[Observation] | None, scale
 
 
 def with_shift(nominal: Model, rig: Rig, catalogue: Catalogue) -> Model:
-    """The model with an input that may be logged earlier or later by `SHIFT` samples and act `HELD` later, where its delay is no part of it."""
+    """The model with an input shift of up to `SHIFT` + `HELD` samples in either direction, unless it has an input delay."""
     if rig.recorded == "nothing" or nominal.term("input_delay") is not None:
         return nominal
     most = (SHIFT + HELD) / rig.runs[0].rate
@@ -96,9 +98,11 @@ def plain_force(machine: Machine, x: Array, v: Array) -> Array:
 
 
 def force_share(rig: Rig, seen: Sequence[Observation] | None, free: Sequence[str]) -> float:
-    """Rms of the force that the nominal model lacks in the learning records `seen`, in proportion to that of the force that
-    drives the machine; what the model's `free` attributes can absorb of it is left out, and where the effort is recorded what a
-    shift of the effort by up to `SHIFT` samples can."""
+    """Rms of the force that the nominal model lacks in the records `seen`, relative to that of the driving force.
+
+    The part that the model's `free` attributes can absorb is excluded. Where the effort is recorded, so is the part that a shift of
+    the effort by up to `SHIFT` samples can absorb.
+    """
     if seen is None:
         return math.inf
     x = np.concatenate([one.position for one in seen])
@@ -114,7 +118,7 @@ def force_share(rig: Rig, seen: Sequence[Observation] | None, free: Sequence[str
     absorbed = np.column_stack([columns[name] for name in free if getattr(rig.believed, name)])
     if rig.recorded == "effort":
         forces = np.split(drive, np.cumsum([len(one.position) for one in seen])[:-1])
-        moved = [np.gradient(force) for force in forces]  # by one sample
+        moved = [np.gradient(force) for force in forces]  # change by a shift of one sample
         shift = np.concatenate(moved)[:, None]
         size = np.linalg.lstsq(np.hstack([shift, absorbed]), lacking, rcond=None)[0][0]
         lacking = lacking - float(np.clip(size, -SHIFT, SHIFT)) * shift[:, 0]
@@ -125,10 +129,10 @@ def force_share(rig: Rig, seen: Sequence[Observation] | None, free: Sequence[str
 def strength_for(
     target: float, ratio_at: Callable[[float], float], close: float = SIZE_TOLERANCE, tries: int = TRIES
 ) -> tuple[float, float]:
-    """Strength in (0, 1] at which `ratio_at` comes close to `target`, and the ratio there.
+    """Strength in (0, 1] at which `ratio_at` is close to `target`, and the ratio there.
 
-    Effects grow with a power of their strength, so the search goes by secants in logarithms, within the bracket that it has
-    seen. Where the target is out of reach, the strength that comes nearest is returned; (0, 0) where there is none.
+    Effects grow with a power of their strength. The search therefore uses secants in logarithms, within the known bracket. If the
+    target is out of reach, the nearest strength is returned; (0, 0) where there is none.
     """
     low, high = math.log(1e-7), 0.0
     place, power = math.log(0.05), 1.0

@@ -1,7 +1,8 @@
-"""Calibration: noise, random forces and scatter of a machine that is known to be healthy, from its first minute.
+"""Calibration: noise, random forces and statistics of a machine known to be healthy, from its first minute.
 
-A constant force that the model lacks (a rest length, a weight, an offset a little off) is learnt first. The filter corrects for it once
-a segment and no sooner, so that the model's speed would be a sawtooth beside the machine's, and with it what each change is thought to do.
+A constant force that the model lacks (a slightly wrong rest length, weight or offset) is estimated first. The filter corrects for it
+only once a segment. The model's speed would therefore be a sawtooth relative to the machine's, and so would the sensitivities to
+each change.
 """
 
 from collections.abc import Sequence
@@ -27,26 +28,35 @@ from rhythmid.twin.segment import Simulation
 from rhythmid.twin.settings import Settings
 
 Array = NDArray[np.float64]
-SEGMENT = 0.2  # s
-BLOCKS = 4  # of a segment at least
-KICKS = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # candidates, of the usual speed in a segment
-TUNED = 60  # segments that random forces are tuned on
-PASSES = 3  # for each candidate, at most
-FORCE_PASSES = 3  # in which the constant force is learnt, each with a filter tuned to what is left of it
-CONVERGED_VARIANCE_CHANGE = 0.1  # change of the noise's variance from pass to pass that is none
-SETTLED = 15  # segments until the beginning is forgotten, three of the seconds of which a minute has sixty
-ROUGH = 3  # differences of the measurement that leave noise and take motion away
-LEAST_NOISE_SHARE = 1e-9  # of the motion: noise that no sensor is below
+SEGMENT = 0.2  # [s]
+BLOCKS = 4  # minimum number of blocks in a segment
+KICKS = (
+    1e-5,
+    1e-4,
+    1e-3,
+    1e-2,
+    1e-1,
+)  # candidate random changes of speed in a segment, relative to the usual speed
+TUNED = 60  # segments for tuning the random forces
+PASSES = 3  # largest number of passes for each candidate
+FORCE_PASSES = 3  # passes for the constant force, each with a filter tuned to the remainder
+CONVERGED_VARIANCE_CHANGE = (
+    0.1  # relative change of the noise's variance from pass to pass that counts as converged
+)
+SETTLED = 15  # segments until the initial state is forgotten: three seconds of the minute
+ROUGH = 3  # order of differences that keep the measurement's noise and remove its motion
+LEAST_NOISE_SHARE = 1e-9  # smallest noise as a share of the motion; no sensor is better
 CONSTANT = "constant_force.force"
-UNNOTICED = 0.01  # of the innovations' squares, below which a constant force disturbs no filter
-LOST = 0.5  # of the motion that innovations may be, above which the model is not one of this machine
+UNNOTICED = 0.01  # share of the innovations' squares below which a constant force does not disturb the filter
+LOST = 0.5  # ratio of innovations to motion from which the model does not describe this machine
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """All that a twin knows of the healthy machine.
+    """The twin's knowledge of the healthy machine.
 
-    `nrmse` are the innovations as a share of the motion, `sizes` (p,) and `filter` what simulation and filter are made with.
+    `nrmse` is the ratio of the innovations to the motion. `sizes` (p,) are the scales of the changes, `filter` the filter's
+    parameters.
     """
 
     model: Model
@@ -60,7 +70,7 @@ class Calibration:
 
     @property
     def constant_force(self) -> float:
-        """That of the model, with what was learnt of it; in the model's unit of force."""
+        """The constant force of the model, including the estimated part; in the model's unit of force."""
         return self.model.value(CONSTANT) if CONSTANT in self.model.parameters else 0.0
 
     @property
@@ -71,8 +81,10 @@ class Calibration:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Samples of the healthy machine, taken in segments of `size` samples and averaged over blocks of `block` of them; `late` is the
-    lateness of each measurement."""
+    """Samples of the healthy machine, in segments of `size` samples that are averaged over blocks of `block` samples.
+
+    `late` is the lateness of each measurement [s].
+    """
 
     output: Samples
     late: Array
@@ -87,7 +99,7 @@ class Stretch:
         return segments(self.output.time, self.size)
 
     def innovations(self, observer: Observer, pieces: Sequence[slice]) -> list[Innovations]:
-        """What an observer finds of these segments, without those that it cannot follow and those that came too late."""
+        """Innovations of these segments, without those where the model diverges or the measurements are too late."""
         time, value = self.output.time, self.output.value
         doubts = self.doubts(pieces)
         found = [
@@ -97,7 +109,7 @@ class Stretch:
         return [one for one, doubt in zip(found, doubts) if one is not None and doubt.punctual]
 
     def doubts(self, pieces: Sequence[slice]) -> list[Doubt]:
-        """In the times of these segments. Raises InputError where most of them came too late to tell of the physics."""
+        """Uncertainty of the times in these segments. Raises InputError where most of them are too late to be used."""
         doubts = [Doubt.of(self.output.time, self.late, at.start, at.stop) for at in pieces]
         if sum(doubt.punctual for doubt in doubts) < max(len(doubts) // 2, SETTLED + 1):
             raise InputError(
@@ -107,7 +119,7 @@ class Stretch:
 
 
 def segments(time: Array, size: int) -> list[slice]:
-    """Whole segments of so many samples."""
+    """All complete segments of `size` samples."""
     return [slice(i, i + size) for i in range(0, len(time) - size + 1, size)]
 
 
@@ -119,9 +131,9 @@ def calibrate(
     command: Samples,
     forcing: Samples | None,
 ) -> Calibration:
-    """Learn the healthy machine from a stretch of samples.
+    """Calibrate on a stretch of the healthy machine's samples.
 
-    Raises InputError where the stretch shows no motion, or motion that the model does not make.
+    Raises InputError where the stretch shows no motion, or a motion that the model does not reproduce.
     """
     period = nominal_period(np.diff(output.time))
     speed = _speed(output, period, settings)
@@ -179,7 +191,7 @@ def _scatter(simulation: Simulation, output: Samples, period: float, settings: S
 
 
 def _size(value: float, change: Change, force: float, speed: float, position: float) -> float:
-    """Usual size of a parameter: its value, or where that is zero what it would be by its unit."""
+    """Usual size of a parameter: its value or, where that is zero, a typical value for its unit."""
     if value != 0.0:
         return abs(value)
     unit = change.unit
@@ -193,13 +205,13 @@ def _size(value: float, change: Change, force: float, speed: float, position: fl
 def _followed(
     simulation: Simulation, stretch: Stretch, scatter: Array, sizes: Array
 ) -> tuple[Filter, list[Innovations]]:
-    """The filter tuned to the machine, and its innovations with what changes do to them, once the beginning is forgotten."""
+    """The filter tuned to the machine, and its innovations with their sensitivities to changes, without the initial transient."""
     filter = _tuned(simulation, stretch, scatter)
     return filter, stretch.innovations(Observer(simulation, filter, sizes), stretch.pieces)[SETTLED:]
 
 
 def _constant_force(found: Sequence[Innovations], changes: Sequence[Change]) -> tuple[float, float]:
-    """The constant force that the innovations show, and the share of their squares that it explains."""
+    """The constant force estimated from the innovations, and the share of their squares that it explains."""
     names = [change.name for change in changes]
     if CONSTANT not in names:
         return 0.0, 0.0
@@ -213,9 +225,9 @@ def _constant_force(found: Sequence[Innovations], changes: Sequence[Change]) -> 
 
 
 def _tuned(simulation: Simulation, stretch: Stretch, scatter: Array) -> Filter:
-    """Noise and random forces under which the innovations are most likely.
+    """Noise and random forces that maximise the likelihood of the innovations.
 
-    Each candidate of the forces is tried with the noise that its own innovations show.
+    For each candidate of the random forces the noise is estimated from its own innovations.
     """
     some, block, value = stretch.pieces[: SETTLED + TUNED], stretch.block, stretch.output.value
     averaged = value[: len(value) // block * block].reshape(-1, block).mean(axis=1)

@@ -1,4 +1,4 @@
-"""Changes of physics that a twin looks for: each a parameter of the model, or of an element that it could gain."""
+"""Changes of physics that a twin looks for: parameters of the model, or of an element that it could gain."""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,10 @@ GAINED = (  # one effect of each kind that a slot of the signal path may gain
     "input_delay", "actuator_gain", "coulomb_friction", "viscous_damper", "constant_force", "measurement_delay",
     "sensor_gain", "sensor_offset",
 )  # fmt: skip
-SAME = {"viscous_damper": ("switched_damper",)}  # beside which another parameter says the same
-SHARP = 0.05  # of the usual speed, over which the sign of an added friction turns
+SAME = {
+    "viscous_damper": ("switched_damper",)
+}  # elements of the model with a parameter that already does the same
+SHARP = 0.05  # share of the usual speed over which the sign of an added friction changes
 INERTIA_SLOT = "inertia"
 
 
@@ -26,17 +28,17 @@ class Change:
 
     @property
     def delay(self) -> bool:
-        """Whether it is a transport delay: it moves a signal in time, and is no parameter of the simulation."""
+        """Whether it is a transport delay, which shifts a signal in time and is no parameter of the simulation."""
         return self.name in DELAYS
 
 
 def watched(
     model: Model, catalogue: Catalogue, speed: float, kind: InputKind = "force"
 ) -> tuple[Model, tuple[Change, ...]]:
-    """The model with all elements that it could gain, at sizes that change nothing, and the changes to look for.
+    """The model with all elements that it could gain, at sizes without effect, and the changes to look for.
 
-    `speed` [the model's unit] is the usual one of the motion. Changes are the inertia, the free parameters and the sizes
-    of the model's elements but for drives, and the sizes of the elements added.
+    `speed` [the model's unit] is the usual speed of the motion. Changes are the inertia, the free parameters and the sizes
+    of the model's elements except drives, and the sizes of the added elements.
     """
     for name in GAINED:
         element = catalogue[name]

@@ -1,12 +1,12 @@
-"""Detector: whether the innovations of the last seconds are those of a healthy machine, at a stated rate of false alarms.
+"""Detector: test whether the innovations of the last seconds are those of a healthy machine, at a given false-alarm rate.
 
-Two statistics over sliding windows. The score statistic is large when some change of physics of known kind would explain the
-innovations; the sum of squares also when none would. Both are compared with what the healthy stretch showed: its own mean score
-is subtracted, and its scatter from window to window says how much larger than by theory they become by chance. Thresholds are
-quantiles of the F distribution: the healthy stretch is finite, and so is the knowledge of that scatter.
+Two statistics are computed over sliding windows. The score statistic is large when a known kind of change would explain the
+innovations. The sum of squares is large also when none would. Both are compared with the healthy stretch. Its mean score is
+subtracted. Its scatter from window to window gives the overdispersion relative to theory. Thresholds are quantiles of the F
+distribution, because the healthy stretch is finite, and so is the knowledge of this scatter.
 
-Every segment tests every window, so that the probability of each test is the allowed rate of false alarms, shared among all tests of a day.
-Tests that share data go off together; counting them as separate only makes false alarms rarer (Bonferroni).
+Every segment tests every window. The probability of each test is the allowed false-alarm rate divided by the number of tests a day.
+Tests that share data raise alarms together; counting them as separate only makes false alarms rarer (Bonferroni).
 """
 
 from collections.abc import Sequence
@@ -21,14 +21,22 @@ from rhythmid.record.clock_time import DAY
 from rhythmid.twin.score import Score, inverse
 
 Array = NDArray[np.float64]
-WINDOWS = (1.0, 5.0)  # s: the shorter for large changes, the longer for small ones and for telling them apart
-STATISTICS = 2  # of each window
+WINDOWS = (1.0, 5.0)  # [s]: the shorter for large changes, the longer for small ones and for isolation
+STATISTICS = 2  # tests in each window
 
 
 @dataclass(frozen=True)
 class Threshold:
-    """Of one window: its segments, how many of it the healthy stretch had, the overdispersion of both statistics there, and the
-    degrees of freedom with which that of the score is known."""
+    """Threshold data of one window length.
+
+    Attributes
+    ----------
+    segments : segments in the window.
+    windows : number of such windows in the healthy stretch.
+    score_excess, squares_excess : overdispersion of both statistics there.
+    score_freedom : degrees of freedom with which the overdispersion of the score is known.
+    squares_mean : mean square of the innovations.
+    """
 
     segments: int
     windows: int
@@ -40,9 +48,10 @@ class Threshold:
 
 @dataclass(frozen=True)
 class Healthy:
-    """Healthy operation: the offset (p,) that explains its mean score, the inverse information of that, and thresholds.
+    """Statistics of healthy operation.
 
-    `probability` is that of a single test to go off.
+    `offset` (p,) are the changes that explain the mean score, `uncertainty` (p, p) is their inverse information. `probability` is
+    that of an alarm in a single test.
     """
 
     offset: Array
@@ -51,18 +60,18 @@ class Healthy:
     probability: float
 
     def centred(self, score: Score) -> Array:
-        """Score (p,) of a window without what it is in healthy operation."""
+        """Score (p,) of a window without its expectation in healthy operation."""
         return score.score - score.information @ self.offset
 
     def statistic(self, score: Score) -> tuple[float, int]:
-        """Score statistic, χ² with so many degrees of freedom where the innovations are white."""
+        """Score statistic and its degrees of freedom; χ² distributed where the innovations are white."""
         spread = score.information + score.information @ self.uncertainty @ score.information
         inverted, rank = inverse(spread)
         centred = self.centred(score)
         return float(centred @ inverted @ centred), rank
 
     def mismatch(self, score: Score, threshold: Threshold) -> float:
-        """The larger of both statistics of a window, 0 where it is as expected, 1 at its threshold; above that it goes off."""
+        """The larger of both statistics of a window, scaled to 0 at the expectation and 1 at the threshold, where the alarm begins."""
         statistic, rank = self.statistic(score)
         if score.count == 0 or rank == 0:
             return 0.0
@@ -70,20 +79,20 @@ class Healthy:
         squares = score.squares / (score.count * threshold.squares_mean)
         count = max(1, round(score.count / threshold.squares_excess))
         most = _quantile(self.probability, count, threshold.windows * count)
-        relative = statistic / (rank * threshold.score_excess)  # both have the mean 1 in healthy operation
+        relative = statistic / (rank * threshold.score_excess)  # both have mean 1 in healthy operation
         return max((relative - 1.0) / (limit - 1.0), (squares - 1.0) / (most - 1.0), 0.0)
 
 
 @lru_cache(maxsize=1024)
 def _quantile(probability: float, first: int, second: float) -> float:
-    """What an F distribution with these degrees of freedom exceeds with this probability."""
+    """The value that an F distribution with these degrees of freedom exceeds with this probability."""
     return float(f_distribution.isf(probability, first, second))
 
 
 def learn_healthy(scores: Sequence[Score], segment: float, false_alarms: float) -> Healthy:
-    """What healthy operation is, from the scores of its segments, each of which lasts `segment` [s].
+    """Learn healthy operation from the scores of its segments, each of which lasts `segment` [s].
 
-    `false_alarms` are those allowed a day.
+    `false_alarms` is the number allowed a day.
     """
     whole = sum(scores[1:], scores[0])
     uncertainty, _ = inverse(whole.information)
@@ -97,7 +106,7 @@ def learn_healthy(scores: Sequence[Score], segment: float, false_alarms: float) 
         ]
         excess, ranks, squares = [], [], []
         for one in windows:
-            # the offset was fitted to this window, too, so that less is left in it than in a later one
+            # the offset was fitted to this window, too, so that its residual is smaller than in a later window
             spread = one.information - one.information @ uncertainty @ one.information
             inverted, rank = inverse(spread)
             centred = one.score - one.information @ offset

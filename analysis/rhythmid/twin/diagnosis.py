@@ -1,4 +1,4 @@
-"""A diagnosis of the last minute, in a process of its own that lets everything else go before."""
+"""A diagnosis of the last minute, in a separate process of low priority."""
 
 import json
 import os
@@ -12,13 +12,13 @@ from rhythmid.model import Model
 from rhythmid.record.convert import write_record
 from rhythmid.record.record import Record
 
-NICER = 5  # than the twin: a third of its share of a busy processor, by the kernel's table of weights, and not starved
-BUDGET = 120.0  # s in which its answer is due
-PATIENCE = 900.0  # s that it may take in all
+NICER = 5  # niceness above the twin's: by the kernel's table of weights a third of its share of a busy processor, without starving
+BUDGET = 120.0  # [s] budget of the diagnosis
+PATIENCE = 900.0  # [s] after which it is stopped
 
 
 class Diagnosing:
-    """A `rhythmid diagnose` under way. `poll` says what it found, once."""
+    """A running `rhythmid diagnose`. `poll` returns its result once."""
 
     def __init__(self, record: Record, model: Model, elements: tuple[Path, ...] = ()) -> None:
         self._folder = TemporaryDirectory(prefix="rhythmid-twin-")
@@ -39,9 +39,9 @@ class Diagnosing:
         os.setpriority(os.PRIO_PROCESS, self._process.pid, min(own + NICER, 19))
 
     def poll(self, wait: bool = False) -> dict[str, Any] | None:
-        """Verdict, summary, names with slot and probability, and the parameters as refitted; None while it is under way, unless told to `wait`.
+        """Verdict, summary, names with slot and probability, and refitted parameters.
 
-        A diagnosis that fails has the verdict "failed", with the reason as summary.
+        None while it is running, unless told to `wait`. A diagnosis that fails has the verdict "failed", with the reason as summary.
         """
         if self._process.poll() is None and not wait:
             return None
@@ -61,7 +61,7 @@ class Diagnosing:
         return {key: answer[key] for key in ("verdict", "summary", "parameters")} | {"missing": missing}
 
     def stop(self) -> None:
-        """End it without an answer."""
+        """Stop without an answer."""
         if self._process.poll() is None:
             self._process.kill()
             self._process.communicate()

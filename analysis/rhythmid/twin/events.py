@@ -1,4 +1,4 @@
-"""Events: mismatches from their beginning to their end, as a user reads them."""
+"""Events: mismatches from beginning to end, in a form for users."""
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -13,10 +13,10 @@ class Event:
 
     Attributes
     ----------
-    since : when it was seen first [s].
-    until : when it was seen last [s]; None while it lasts.
-    peak : largest statistic, 0 as in healthy operation, 1 at the threshold.
-    isolation, delays : as seen last.
+    since : time when it was first detected [s].
+    until : time when it was last detected [s]; None while it lasts.
+    peak : largest statistic: 0 in healthy operation, 1 at the threshold.
+    isolation, delays : as last detected.
     diagnosis : verdict and names of a diagnosis of its last minute; None where there was none.
     """
 
@@ -43,7 +43,7 @@ class Event:
         }  # fmt: skip
 
     def sentence(self) -> str:
-        """One line for a person."""
+        """One line of text."""
         where = self.isolation
         told = "in no slot that is known"
         if where is not None and where.slot != "unknown":
@@ -55,19 +55,19 @@ class Event:
 
 
 class Events:
-    """The mismatches that a twin has told of."""
+    """The mismatches that a twin has reported."""
 
     def __init__(self) -> None:
         self.found: list[Event] = []
-        self._seen = 0.0  # when the last one was seen last
+        self._seen = 0.0  # time when the last one was last detected
 
     @property
     def current(self) -> Event | None:
-        """The mismatch that lasts; None without one."""
+        """The present mismatch; None without one."""
         return self.found[-1] if self.found and self.found[-1].until is None else None
 
     def take(self, status: Status) -> None:
-        """Take note of what the twin says."""
+        """Update from a status of the twin."""
         now = self.current
         if status.since is None:
             if now is not None:

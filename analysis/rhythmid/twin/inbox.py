@@ -1,4 +1,4 @@
-"""Messages of running topics as samples: read as those of a bag are, by what signals.yaml says."""
+"""Messages of running topics as samples, read like those of a bag according to signals.yaml."""
 
 from collections import deque
 
@@ -16,9 +16,10 @@ ROLES: tuple[Role, ...] = ("input", "output", "forcing", "released")
 
 
 class Inbox:
-    """Takes serialised messages from any thread; `drain` makes samples of them.
+    """Takes serialised messages from any thread; `drain` converts them to samples.
 
-    Times are seconds since the first message; `released` are the commands as the last relay released them. Raises InputError where the signals do not name topics, or a forcing by formula.
+    Times are seconds since the first message. `released` is the source of the commands as released by the last relay. Raises
+    InputError where the signals do not name topics, or where a forcing is given by a formula.
     """
 
     def __init__(self, signals: Signals, released: Source | None = None) -> None:
@@ -41,21 +42,21 @@ class Inbox:
 
     @property
     def forced(self) -> bool:
-        """Whether the forcing is among the signals."""
+        """Whether the signals contain the forcing."""
         return "forcing" in self.channels
 
     def learn_type(self, topic: str, type_name: str, definition: str = "") -> None:
-        """Say of which type the messages of a topic are, with the definition where that is no standard type."""
+        """Set the message type of a topic, with its definition where it is no standard type."""
         self._types[topic] = Topic(topic, type_name, "cdr", definition, "ros2msg" if definition else "")
 
     def put(self, topic: str, data: bytes, received_ns: int) -> None:
-        """A message as received."""
+        """Store a received message."""
         self._waiting[topic].append((data, received_ns))
 
     def drain(self) -> dict[Role, tuple[Array, Array]]:
-        """Samples of all messages that have come since the last time: times [s] and values of each role.
+        """Samples of all messages received since the last call: times [s] and values of each role.
 
-        Raises InputError where messages have no such field, or no stamp where one is needed.
+        Raises InputError where messages lack the field, or a stamp where one is needed.
         """
         blocks = [self._block(topic) for topic in self.topics]
         wanted = {

@@ -1,4 +1,4 @@
-"""Isolation: in which slot of the signal path the physics has changed, by how much, and the delays now."""
+"""Isolation: the slot of the signal path in which the physics has changed, the size of the change, and the present delays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,15 +12,15 @@ from rhythmid.twin.score import Score, inverse
 
 Array = NDArray[np.float64]
 ODDS = 2.0 * np.log(20.0)  # in χ²: a slot is named alone when it is twenty times as likely as every other
-# Of the square of what a change does, below which two changes do the same. Effects are computed in proportion to a change's size, and a delay
-# of 5 ms moves a signal of 5 Hz by 8 % otherwise, 0.6 % of the square.
+# Share of the square of a change's effect below which two changes count as equivalent. Effects are computed as proportional to a
+# change's size; but a delay of 5 ms shifts a signal of 5 Hz by an amount that differs from this by 8 %, 0.6 % of the square.
 ALIKE = 0.01
-SHOWN = 0.5  # of the score statistic that the best change explains at least, or the physics is none of those known
+SHOWN = 0.5  # share of the score statistic that the best change must explain; otherwise the change is of no known kind
 
 
 @dataclass(frozen=True)
 class Sized:
-    """A change with its size, its standard deviation and unit, and the χ² that it explains by itself."""
+    """A change with its size, standard deviation and unit, and the χ² that it explains alone."""
 
     name: str
     slot: str
@@ -32,11 +32,11 @@ class Sized:
 
 @dataclass(frozen=True)
 class Isolation:
-    """Where a mismatch lives.
+    """The location of a mismatch.
 
-    `slot` explains most of it, `rivals` are slots that cannot be told from it, `share` is what each slot's best change explains
-    of the mismatch, `changes` those best changes, the most likely first. `slot` is "unknown" where none explains half of it.
-    `excess` is how much larger than by theory what they leave is.
+    `slot` explains most of it; it is "unknown" where none explains half. `rivals` are slots that cannot be separated from it.
+    `share` is the part of the mismatch that each slot's best change explains. `changes` are these best changes, the most likely
+    first. `excess` is the overdispersion of what they leave.
     """
 
     slot: str
@@ -47,13 +47,13 @@ class Isolation:
 
 
 def isolate(score: Score, healthy: Healthy, changes: Sequence[Change], excess: float) -> Isolation:
-    """The slot whose one change explains the score best.
+    """Find the slot in which a single change explains the score best.
 
-    `excess` is the overdispersion of the score in healthy operation. What the best change leaves counts, too: a change so large that
-    its effects are no longer proportional to its size leaves more than noise.
+    `excess` is the overdispersion of the score in healthy operation. It is increased to that of the remainder of the best change: a
+    change so large that its effects are no longer proportional to its size leaves more than noise.
 
-    A slot is a rival where its best change is within the odds, or does the same to the innovations as the best of all: what then
-    puts one before the other is the model's error.
+    A slot is a rival where its best change is within the odds, or has the same effect on the innovations as the best of all. In the
+    latter case only the model's error decides which of the two is first.
     """
     centred = healthy.centred(score)
     information = np.diag(score.information)
@@ -87,14 +87,14 @@ def isolate(score: Score, healthy: Healthy, changes: Sequence[Change], excess: f
 
 
 def _apart(information: Array, one: int, other: int) -> float:
-    """The share of what a change explains that another change cannot: 0 where their effects are alike, 1 where orthogonal."""
+    """Share of a change's effect that another change cannot explain: 0 for equivalent changes, 1 for orthogonal ones."""
     alike = float(information[one, other]) ** 2 / float(information[one, one] * information[other, other])
     return max(0.0, 1.0 - alike)
 
 
 @dataclass(frozen=True)
 class DelayNow:
-    """A delay [s] as the last window shows it, with its standard deviation; None where it does not show."""
+    """A delay [s] in the last window, with its standard deviation; None where it is not identifiable."""
 
     value: float
     std: float | None
@@ -108,10 +108,10 @@ def delays_now(
     beside: str | None,
     excess: float,
 ) -> dict[str, DelayNow]:
-    """Both delays now, and their sum, from the score of a window.
+    """Present delays and their sum, from the score of a window.
 
-    `values` [s] are the model's delays in the order of `DELAYS`. They are estimated together, and together with the change
-    `beside`, which may be what has really happened.
+    `values` [s] are the model's delays in the order of `DELAYS`. They are estimated together with the change `beside`, which may be
+    the true cause.
     """
     names = [change.name for change in changes]
     present = [name for name in DELAYS if name in names]

@@ -1,4 +1,4 @@
-"""A calibration as a file, so that a twin that is started again knows the healthy machine."""
+"""A calibration as a file, so that a restarted twin knows the healthy machine."""
 
 import json
 from pathlib import Path
@@ -43,7 +43,7 @@ def save(calibration: Calibration, path: Path) -> None:
 
 
 def load(path: Path, model: Model, settings: Settings, forced: bool, catalogue: Catalogue) -> Calibration:
-    """Read a calibration of this model. Raises InputError where it is none, or one of another model."""
+    """Read a calibration of this model. Raises InputError where the file is no calibration, or one of another model."""
     try:
         kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         if kept["version"] != VERSION:

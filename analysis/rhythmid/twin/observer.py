@@ -1,11 +1,11 @@
-"""Extended Kalman filter that keeps a model beside the machine, and its normalised innovations.
+"""Extended Kalman filter that runs a model beside the machine, and its normalised innovations.
 
-A segment of measurements is taken at once: the covariance of all its innovations is factored, which gives the same as taking
-one measurement after another, B. D. O. Anderson, J. B. Moore, Optimal Filtering, 1979, sections 3.1, 8.2 and 10.2. Between
-segments a random force kicks the mass: without it the filter would believe its model more and more, and follow no longer.
+A segment of measurements is processed at once: factoring the covariance of all its innovations gives the same result as processing
+one measurement after another (B. D. O. Anderson, J. B. Moore, Optimal Filtering, 1979, sections 3.1, 8.2 and 10.2). Between
+segments a random force changes the velocity. Without it the filter's covariance would shrink, and it would cease to follow.
 
-What a change of physics does to the innovations is carried along: the change moves the outputs, and the filter follows in part.
-M. Basseville, I. V. Nikiforov, Detection of Abrupt Changes, 1993, section 7.2.5.
+The effect of a change of physics on the innovations is computed as well: the change moves the outputs, and the filter follows in
+part (M. Basseville, I. V. Nikiforov, Detection of Abrupt Changes, 1993, section 7.2.5).
 """
 
 from dataclasses import dataclass
@@ -19,15 +19,16 @@ from rhythmid.twin.samples import Samples
 from rhythmid.twin.segment import Inputs, Run, Simulation, Start
 
 Array = NDArray[np.float64]
-KNOWN = 3.0  # times its usual scatter: standard deviation of a state at the beginning
+KNOWN = 3.0  # initial standard deviation of a state, times its usual scatter
 
 
 @dataclass(frozen=True)
 class Filter:
-    """What the filter is made with.
+    """Parameters of the filter.
 
-    `noise` is the variance of a block average of the measurement, `kick` that of the velocity by random forces in a segment,
-    `scatter` (q,) the usual sizes of the states, `block` the samples averaged into one, `samples` those of a segment.
+    `noise` is the variance of a block average of the measurement. `kick` is that of the velocity change by random forces in a
+    segment. `scatter` (q,) are the usual sizes of the states. `block` is the number of samples averaged into one, `samples` the
+    number in a segment.
     """
 
     noise: float
@@ -39,8 +40,11 @@ class Filter:
 
 @dataclass(frozen=True)
 class Innovations:
-    """Innovations (m,) of a segment in units of their standard deviations, what a unit of each change does to them (m, p),
-    their log density up to a constant, and the rms of the innovations in the measurement's unit."""
+    """Innovations of a segment.
+
+    `white` (m,) are normalised innovations, `by_change` (m, p) their sensitivities to each change. `log_density` is their log
+    density up to a constant, `rms` the rms of the innovations in the measurement's unit.
+    """
 
     white: Array
     by_change: Array
@@ -49,14 +53,14 @@ class Innovations:
 
 
 class Observer:
-    """The filter at work, from segment to segment."""
+    """The running filter; it processes one segment after another."""
 
     def __init__(self, simulation: Simulation, given: Filter, sizes: Array | None) -> None:
         self.simulation, self.given, self.sizes = simulation, given, sizes
         self.start: Start | None = None
 
     def begin(self, stamps: Array, values: Array) -> None:
-        """Begin at the last of some samples, with position and velocity of the straight line through them."""
+        """Initialise at the last of some samples, with position and velocity of a straight line through them."""
         q = self.simulation.states
         time = float(self.simulation.physical(stamps)[-1])
         line = np.polynomial.Polynomial.fit(stamps - stamps[-1], values, 1)
@@ -72,8 +76,10 @@ class Observer:
     def take(
         self, stamps: Array, values: Array, doubt: Doubt, command: Samples, forcing: Samples | None
     ) -> Innovations | None:
-        """Take a segment of measurements in, whose times are in `doubt`; None at the beginning and where the model diverges and is
-        begun anew."""
+        """Process a segment of measurements with uncertain times.
+
+        None for the first segment, and where the model diverges; the filter is then initialised again.
+        """
         if self.start is None:
             self.begin(stamps, values)
             return None
@@ -86,7 +92,7 @@ class Observer:
         return found
 
     def _of_times(self, run: Run, doubt: Doubt) -> Array:
-        """Covariance (m, m) of the block averages by the doubt in their times: of each one's lateness, and of one that all have."""
+        """Covariance (m, m) of the block averages due to uncertain times: an independent and a common part."""
         each, all_of_them = (
             (np.abs(run.slope) * late + 0.5 * np.abs(run.curvature) * late**2)
             .reshape(-1, self.given.block)
@@ -110,7 +116,7 @@ class Observer:
         joined = np.column_stack([error, sensitivity, run.by_start @ before])
         white = solve_triangular(root, joined, lower=True)
         p = len(self.simulation.changes)
-        gain = white[:, 1 + p :].T  # of white innovations
+        gain = white[:, 1 + p :].T  # for white innovations
         state = self.start.state + gain @ white[:, 0]
         again = self.simulation.rows(given, Start(self.start.time, state, self.start.past))
         if again is None:

@@ -1,4 +1,4 @@
-"""Commands as they were released: where a relay on the way passes some on late, they act later than their stamps and the delay say."""
+"""Release times of commands: if a relay is late, commands act later than stamp and delay imply."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,11 +7,13 @@ from rhythmid.twin.lateness import LOOK, lateness
 from rhythmid.twin.samples import Samples
 
 Array = NDArray[np.float64]
-APART = 1e-9  # s between commands that were released together
+APART = 1e-9  # [s] between commands that were released together
 
 
 class Released:
-    """Gives commands the times that they would have been stamped with, had they been released punctually when they were.
+    """Corrects the times of commands for a late release.
+
+    The corrected time is the stamp that a punctually released command would have, if released at the same time.
 
     Parameters
     ----------
@@ -24,9 +26,9 @@ class Released:
         self._newest = -np.inf
 
     def take(self, silent: float) -> tuple[Array, Array]:
-        """Times [s] and values of the commands whose lateness is known now, shapes (n,), (n,), each told once.
+        """Times [s] (n,) and values (n,) of the commands whose lateness is now known; each command is returned once.
 
-        Those stamped before `silent` [s] are told in any case.
+        Commands stamped before `silent` [s] are always returned.
         """
         released, given = self.released.time, self.given
         until = max(silent, self.released.newest - self._delay - LOOK)

@@ -1,4 +1,4 @@
-"""Samples of one signal as they come in: appended at the end, forgotten at the beginning."""
+"""Samples of one signal: new ones are appended at the end, old ones dropped at the beginning."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,7 @@ Array = NDArray[np.float64]
 
 
 class Samples:
-    """Times [s], increasing, and values of one signal. What is not finite or not newer than the last is left out, and counted."""
+    """Times [s], increasing, and values of one signal. Samples that are not finite or not newer than the last are dropped and counted."""
 
     def __init__(self) -> None:
         self.time = np.empty(0)
@@ -31,12 +31,12 @@ class Samples:
         self.value = np.concatenate([self.value, value[kept]])
 
     def forget(self, before: float, keep: int = 1) -> None:
-        """Drop samples older than a time [s], but for the last `keep` of them."""
+        """Drop samples older than `before` [s], but keep the last `keep` of them."""
         first = max(0, int(np.searchsorted(self.time, before)) - keep)
         self.time, self.value = self.time[first:], self.value[first:]
 
     def between(self, start: float, end: float, margin: int = 1) -> tuple[Array, Array]:
-        """Samples from start to end [s] and `margin` more on either side."""
+        """Samples from start to end [s], and `margin` more on either side."""
         first, last = np.searchsorted(self.time, [start, end], side="right")
         inside = slice(max(0, int(first) - margin), int(last) + margin)
         return self.time[inside], self.value[inside]

@@ -1,8 +1,7 @@
-"""Scores: what the innovations of a while say about each change of physics, as sums that add up over time.
+"""Scores: the information in innovations on each change of physics, as sums that add up over time.
 
-The innovations are ε = S θ + e with what a unit of each change does to them, S, its size θ, and white e. Their score b = Sᵀε and
-information A = SᵀS are all that matters for θ: M. Basseville, I. V. Nikiforov, Detection of Abrupt Changes, 1993, section 8.2
-(local approach).
+The innovations are ε = S θ + e, with sensitivities S, sizes θ of the changes, and white e. Their score b = Sᵀε and information
+A = SᵀS are sufficient for θ: M. Basseville, I. V. Nikiforov, Detection of Abrupt Changes, 1993, section 8.2 (local approach).
 """
 
 from dataclasses import dataclass
@@ -14,13 +13,12 @@ from rhythmid.identify.noise import NoiseModel
 from rhythmid.twin.observer import Innovations
 
 Array = NDArray[np.float64]
-RANK = 1e-7  # of the largest eigenvalue of the scaled information, below which a combination of changes does not show
+RANK = 1e-7  # ratio to the largest eigenvalue of the scaled information below which a combination of changes is not identifiable
 
 
 @dataclass(frozen=True)
 class Score:
-    """Score b (p,), information A (p, p), sum of squares and number of the innovations, and the sum of their own squares
-    in the measurement's unit."""
+    """Score b (p,) and information A (p, p) of innovations, their sum of squares and their number."""
 
     score: Array
     information: Array
@@ -29,7 +27,7 @@ class Score:
 
     @classmethod
     def zero(cls, changes: int) -> "Score":
-        """Of no innovation."""
+        """The score of no innovations."""
         return cls(np.zeros(changes), np.zeros((changes, changes)), 0.0, 0)
 
     def __add__(self, other: "Score") -> "Score":
@@ -42,7 +40,7 @@ class Score:
 
 
 class Whitener:
-    """Takes the colour out that innovations of a healthy machine have left, in what changes do to them as well."""
+    """Whitens the remaining colour of a healthy machine's innovations, and filters their sensitivities in the same way."""
 
     def __init__(self, noise: NoiseModel, changes: int) -> None:
         self.noise = noise

@@ -1,4 +1,4 @@
-"""A short stretch of the model's run, and what its start and every change of physics do to it."""
+"""Simulation of a short segment, with sensitivities to its initial state and to every change of physics."""
 
 from dataclasses import dataclass, field
 
@@ -16,18 +16,18 @@ from rhythmid.twin.settings import Settings
 
 Array = NDArray[np.float64]
 Pieces = tuple[Array, Array]
-DIFFERENCE_STEP_SHARE = 1e-3  # of its scale, by which a state or parameter is moved to see what it does
+DIFFERENCE_STEP_SHARE = 1e-3  # finite-difference step of a state or parameter, relative to its scale
 DELAY_STEP = (
-    2e-4  # s, likewise of a delay: below the sample period of most machines, above the rounding of times
+    2e-4  # [s] the same for a delay: below the sample period of most machines, above the rounding of times
 )
-MARGIN = 4  # samples on either side of a segment that a spline through a smooth signal takes
-LONGEST_STEP = 2e-3  # s of the integration: a hundredth of a period of 5 Hz
+MARGIN = 4  # samples on either side of a segment that are used for a spline through a smooth signal
+LONGEST_STEP = 2e-3  # [s] largest integration step: a hundredth of a period of 5 Hz
 DIVERGED = 1e100
 
 
 @dataclass(frozen=True)
 class Start:
-    """The machine at the end of the last segment: its time [s] there, state (q,), and the past that elements remember."""
+    """The machine at the end of the last segment: time [s], state (q,), and the past that elements remember."""
 
     time: float
     state: Array
@@ -36,7 +36,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Inputs:
-    """What acts in a segment: the physical times of its samples (n,) [s], the command, the same `DELAY_STEP` later, the forcing."""
+    """Inputs of a segment: the physical times of its samples (n,) [s], the command, the command `DELAY_STEP` later, the forcing."""
 
     times: Array
     command: Pieces
@@ -46,11 +46,11 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Run:
-    """A segment as simulated.
+    """A simulated segment.
 
-    `output` (m,) are block averages, `states` (q,) those at its end, `by_start` (m, q) and `by_change` (m, p) what a unit of
-    each state at the start and of each change does to the output, `end_by_start` (q, q) and `end_by_change` (q, p) to the end.
-    `slope` and `curvature` (n,) are the first and the second derivative of the output at each sample.
+    `output` (m,) are block averages, `states` (q,) those at its end. `by_start` (m, q) and `by_change` (m, p) are the sensitivities of
+    the output to each state at the start and to each change; `end_by_start` (q, q) and `end_by_change` (q, p) those of the end
+    state. `slope` and `curvature` (n,) are the first and the second derivative of the output at each sample.
     """
 
     output: Array
@@ -65,7 +65,7 @@ class Run:
 
 
 class Simulation:
-    """A model, run from segment to segment over signals that come in."""
+    """A model that is simulated segment by segment with incoming signals."""
 
     def __init__(self, model: Model, changes: tuple[Change, ...], settings: Settings, period: float) -> None:
         self.model, self.changes, self.settings = model, changes, settings
@@ -81,7 +81,7 @@ class Simulation:
         return len(self.compiled.layout.states)
 
     def command(self, samples: Samples, start: float, end: float, later: float = 0.0) -> Pieces:
-        """The command as it acts between two times [s], a constant `later` [s] than the model says; zero before the first."""
+        """The command as it acts between two times [s], `later` [s] later than in the model; zero before the first sample."""
         reach = later + self.longest_delay
         time, value = samples.between(start - reach, end, MARGIN)
         if len(time) == 0:
@@ -104,7 +104,7 @@ class Simulation:
         return float(self._late(np.zeros(1))[0])
 
     def _late(self, stamps: Array) -> Array:
-        """How much later than their stamps commands act, (n,) [s]."""
+        """Delay (n,) [s] from the stamps of commands until they act."""
         late = command_delay(self.model, stamps)
         return np.zeros(len(stamps)) if late is None else late
 
@@ -119,11 +119,11 @@ class Simulation:
         return knots, np.ascontiguousarray(_hermite(time, value))
 
     def physical(self, stamps: Array) -> Array:
-        """When measurements with these stamps were taken [s]."""
+        """Times [s] at which measurements with these stamps were taken."""
         return physical_times(self.model, stamps)
 
     def inputs(self, stamps: Array, start: Start, command: Samples, forcing: Samples | None) -> Inputs:
-        """What acts between a start and the last of the stamps."""
+        """Inputs between a start and the last of the stamps."""
         times = np.maximum(self.physical(stamps), start.time)
         begin, end = start.time, float(times[-1])
         later = self.command(command, begin, end, DELAY_STEP)
@@ -134,7 +134,7 @@ class Simulation:
     ) -> tuple[Array, Array] | None:
         """Rows (n, q + 2) at the times after the start, and the past that elements remember; None where the run diverges.
 
-        `command` takes the place of the given one, `parameters` that of the model's.
+        `command` replaces the given one, `parameters` those of the model.
         """
         times = given.times
         none = pieces(None)
@@ -156,10 +156,10 @@ class Simulation:
         scatter: Array,
         sizes: Array | None,
     ) -> Run | None:
-        """Simulate a stretch whose samples are a multiple of `block`.
+        """Simulate a segment whose number of samples is a multiple of `block`; None where the run diverges.
 
-        `scatter` (q,) are the usual sizes of the states, `sizes` (p,) those of the changes; None leaves out what changes do.
-        None where the run diverges.
+        `scatter` (q,) are the usual sizes of the states, `sizes` (p,) those of the changes; with None their sensitivities are left
+        out.
         """
         nominal = self.rows(given, start)
         if nominal is None:
@@ -213,7 +213,7 @@ class Simulation:
 
 
 def _slope(time: Array, value: Array) -> Array:
-    """Rate of change (n,) at samples; 0 where neighbours have one time."""
+    """Rate of change (n,) at samples; 0 where neighbours have equal times."""
     step = np.gradient(time)
     return np.where(step > 0.0, np.gradient(value) / np.where(step > 0.0, step, 1.0), 0.0)
 

@@ -1,4 +1,4 @@
-"""What the live twin is told: how its signals are to be read, and how often it may be wrong."""
+"""Settings of the live twin: the meaning of its signals, and the allowed false-alarm rate."""
 
 from dataclasses import dataclass
 
@@ -8,19 +8,19 @@ from rhythmid.simulation.generated_source import DRIVES, InputKind, OutputKind
 from rhythmid.simulation.signal import Hold
 
 SHORTEST_HEALTHY = (
-    20.0  # s; four of the longest window, below which the scatter of its statistic is not known
+    20.0  # [s]; four of the longest window, below which the scatter of its statistic is not known
 )
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a twin reads its signals and judges them.
+    """Settings for reading and judging the signals of a twin.
 
     Attributes
     ----------
     input_kind, output_kind, hold : as in signals.yaml.
-    healthy : length [s] of the stretch at the beginning that is taken for healthy operation, where there is no calibration.
-    false_alarms : how many a day of healthy operation are allowed on average.
+    healthy : length [s] of the initial stretch that is taken for healthy operation, where there is no calibration.
+    false_alarms : average number allowed a day of healthy operation.
     """
 
     input_kind: InputKind = "force"
@@ -43,5 +43,5 @@ class Settings:
 
     @classmethod
     def of(cls, record: Record, healthy: float = 60.0, false_alarms: float = 1.0) -> "Settings":
-        """Settings for what a record holds."""
+        """Settings for the content of a record."""
         return cls(record.input_kind, record.output_kind, record.hold, healthy, false_alarms)

@@ -1,6 +1,6 @@
-"""The live twin: a model that runs beside the machine, corrected by what is measured, and says when the two differ.
+"""The live twin: a model that runs beside the machine, is corrected by measurements, and reports when the two differ.
 
-It is fed with samples as they come and judges them segment by segment. No ROS, no clock: time is that of the samples.
+It takes samples as they come and judges them segment by segment. It needs neither ROS nor a clock: time is that of the samples.
 """
 
 from collections import deque
@@ -27,23 +27,26 @@ from rhythmid.twin.settings import Settings
 Array = NDArray[np.float64]
 Level = Literal["learning", "late", "ok", "warn", "error"]
 Role = Literal["input", "output", "forcing", "released"]
-CONFIRMED = 10.0  # s of mismatch after which a warning becomes an error
-PATIENCE = 1.0  # s that commands and forcing may be older than the measurement, before they are taken as held
+CONFIRMED = 10.0  # [s] of mismatch after which a warning becomes an error
+PATIENCE = (
+    1.0  # [s] by which commands and forcing may be older than the measurement before they are taken as held
+)
 
 
 @dataclass(frozen=True)
 class Status:
-    """What the twin says after a segment.
+    """The twin's report after a segment.
 
     Attributes
     ----------
-    time : of the newest measurement judged [s].
-    level : learning in the healthy stretch; late where messages come too late to tell of the physics; warn with the first mismatch, error when it has lasted ten seconds.
+    time : time of the newest judged measurement [s].
+    level : "learning" in the healthy stretch; "late" where messages come too late to be used; "warn" with the first mismatch, "error"
+        when it has lasted ten seconds; otherwise "ok".
     mismatch : the largest statistic as a multiple of its threshold.
     innovation : rms of the normalised innovations of the last second, 1 in healthy operation.
-    since : when the mismatch was seen first [s], None without one.
-    isolation : where it lives, None without one.
-    delays : as the last window shows them: input, measurement and their sum.
+    since : time when the mismatch was first detected [s], None without one.
+    isolation : its location, None without a mismatch.
+    delays : estimates from the last window: input, measurement and their sum.
     """
 
     time: float
@@ -60,11 +63,11 @@ class Twin:
 
     Parameters
     ----------
-    model : as identified, with its delays.
-    settings : how the signals are to be read, and the allowed rate of false alarms.
-    forced : whether the forcing is measured; else the model's own drives act.
-    calibration : of an earlier run of the twin; None: the first `settings.healthy` seconds are taken for healthy.
-    released : whether the times at which commands are released are told as well.
+    model : the identified model, with its delays.
+    settings : the meaning of the signals, and the allowed false-alarm rate.
+    forced : whether the forcing is measured; otherwise the model's own drives act.
+    calibration : from an earlier run of the twin; with None, the first `settings.healthy` seconds are taken for healthy.
+    released : whether the release times of commands are given as well.
     """
 
     def __init__(
@@ -87,12 +90,12 @@ class Twin:
         self._observer: Observer | None = None
         self._since: float | None = None
         self._below: float | None = None
-        self._after = 0  # segments since the mismatch was seen
+        self._after = 0  # segments since the mismatch was detected
         if calibration is not None:
             self._engage(calibration)
 
     def push(self, role: Role, time: Array, value: Array) -> None:
-        """Samples of one signal: times [s] on one clock for all signals, increasing, and values; shapes (n,), (n,)."""
+        """Add samples of one signal: times [s] (n,), increasing, on one clock for all signals, and values (n,)."""
         into = self.samples.get(role)
         if self._released is not None and role in ("input", "released"):
             into = self._released.given if role == "input" else self._released.released
@@ -100,9 +103,9 @@ class Twin:
             into.append(np.asarray(time, dtype=float), np.asarray(value, dtype=float))
 
     def advance(self) -> list[Status]:
-        """Judge all segments for which everything has come in; what is said of each.
+        """Judge all segments whose signals are complete; a status for each.
 
-        Raises InputError when the healthy stretch is over and shows no motion, or motion that the model does not make.
+        Raises InputError when the healthy stretch is over and shows no motion, or a motion that the model does not reproduce.
         """
         output = self.samples["output"]
         if self._released is not None:
@@ -131,7 +134,7 @@ class Twin:
         return sum(one.refused for one in self.samples.values())
 
     def _complete(self, time: float) -> bool:
-        """Whether all signals are known up to a time, or their sources silent, and the measurements that tell how late others were."""
+        """Whether all signals up to a time are known, or silent, and so are the later measurements that determine lateness."""
         newest = self.samples["output"].newest
         return newest >= time + LOOK and all(
             one.newest >= time or newest >= time + PATIENCE
@@ -161,10 +164,10 @@ class Twin:
         self._whitener = Whitener(calibration.noise, len(calibration.changes))
         longest = max(one.segments for one in calibration.healthy.thresholds)
         self._scores: deque[Score] = deque(maxlen=longest)
-        self._settling = longest  # segments until what the filter was begun with is forgotten
+        self._settling = longest  # segments until the filter's initial state is forgotten
 
     def _doubt(self, first: int, end: int, period: float) -> Doubt:
-        """Of a segment's times."""
+        """Uncertainty of a segment's times."""
         stamps = self.samples["output"].time
         since = max(0, int(np.searchsorted(stamps, stamps[first] - LOOK)) - 1)
         until = int(np.searchsorted(stamps, stamps[end - 1] + LOOK, side="right"))
@@ -200,7 +203,7 @@ class Twin:
         return sum(scores[1:], scores[0])
 
     def _say(self, calibration: Calibration, now: float, sums: list[tuple[Score, Threshold]]) -> Status:
-        """Status from the scores of all windows, the shortest first."""
+        """Status from the scores of all windows, the shortest window first."""
         healthy, (shortest, fast), (longest, slow) = calibration.healthy, sums[0], sums[-1]
         mismatch = max(healthy.mismatch(total, one) for total, one in sums)
         level = self._level(now, mismatch)
@@ -218,12 +221,12 @@ class Twin:
         return Status(now, level, mismatch, float(np.sqrt(squares)), self._since, where, delays)
 
     def _since_onset(self, fast: int, slow: int) -> int:
-        """Segments that tell of a mismatch: those since it was seen, later without the transient of the short window."""
+        """Number of segments since the mismatch was detected; later on without the transient of the short window."""
         settled = self._after - fast
         return min(settled if settled >= fast else max(self._after, 1), slow)
 
     def _level(self, now: float, mismatch: float) -> Level:
-        """A mismatch lasts until it has been below its threshold for as long as the longest window."""
+        """Level after a test; a mismatch ends when it has been below its threshold for `CONFIRMED` seconds."""
         if mismatch >= 1.0:
             if self._since is None:
                 self._since, self._after = now, 0
@@ -235,7 +238,7 @@ class Twin:
         return "ok" if self._since is None else self._lasting(now)
 
     def _lasting(self, now: float) -> Level:
-        """Level of a mismatch by how long it has lasted."""
+        """Level of a mismatch by its duration."""
         assert self._since is not None
         return "error" if now - self._since >= CONFIRMED else "warn"
 

@@ -1,4 +1,4 @@
-"""Watch a machine: its twin, the mismatches that it tells of, and a diagnosis of each that lasts for a minute."""
+"""Watch a machine: run its twin, collect mismatches, and diagnose each that lasts for a minute."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,15 +19,15 @@ from rhythmid.twin.settings import Settings
 from rhythmid.twin.twin import Role, Status, Twin
 
 Array = NDArray[np.float64]
-DIAGNOSED = 60.0  # s of mismatch after which its last minute is diagnosed
-BEFORE = 2.0  # s of commands and forcing kept from before that minute, longer than delays are
-STEP = 1.0  # s of a record that are fed at a time
+DIAGNOSED = 60.0  # [s] of mismatch after which its last minute is diagnosed
+BEFORE = 2.0  # [s] of commands and forcing kept from before that minute, longer than delays
+STEP = 1.0  # [s] of a record that are processed at a time
 
 
 class Watch:
-    """A twin with a memory: `events` are the mismatches so far.
+    """A twin that also collects `events`, the mismatches so far.
 
-    `diagnose` says whether mismatches that last are diagnosed; the other parameters are those of `Twin`.
+    `diagnose`: lasting mismatches are diagnosed. The other parameters are those of `Twin`.
     """
 
     def __init__(
@@ -47,17 +47,17 @@ class Watch:
         self._diagnose = diagnose
         self._recent: dict[Role, Samples] = {role: Samples() for role in self.twin.samples}
         self._diagnosing: tuple[float, Diagnosing] | None = None
-        self._diagnosed: float | None = None  # the event that has been, or is being, diagnosed
+        self._diagnosed: float | None = None  # the event whose diagnosis is running or finished
 
     def push(self, role: Role, time: Array, value: Array) -> None:
-        """Samples of one signal, as in `Twin.push`."""
+        """Add samples of one signal, as in `Twin.push`."""
         self.twin.push(role, time, value)
         if self._diagnose and role in self._recent:
             self._recent[role].append(np.asarray(time, dtype=float), np.asarray(value, dtype=float))
             self._recent[role].forget(self._recent["output"].newest - DIAGNOSED - BEFORE)
 
     def advance(self) -> list[Status]:
-        """Judge what has come in; see `Twin.advance`."""
+        """Judge the samples received; see `Twin.advance`."""
         said = self.twin.advance()
         for status in said:
             self.events.take(status)
@@ -66,14 +66,14 @@ class Watch:
         return said
 
     def close(self, wait: bool = False) -> None:
-        """End, after a diagnosis that is under way if told to `wait`."""
+        """End; with `wait`, only after a running diagnosis."""
         self._collect(wait)
         if self._diagnosing is not None:
             self._diagnosing[1].stop()
             self._diagnosing = None
 
     def _consider(self, status: Status) -> None:
-        """Begin a diagnosis of a mismatch that has lasted long enough, one at a time."""
+        """Start a diagnosis of a mismatch that has lasted long enough, one at a time."""
         lasting = status.since is not None and status.time - status.since >= DIAGNOSED
         if (
             not (self._diagnose and lasting)
@@ -85,7 +85,7 @@ class Watch:
         self._diagnosed = status.since
         try:
             self._diagnosing = status.since, Diagnosing(self._window(), self._model, self._elements)
-        except InputError as problem:  # an acceleration, say, which no bag of joint states holds
+        except InputError as problem:  # for example an acceleration, which a bag of joint states cannot hold
             answer = {"verdict": "failed", "summary": str(problem), "missing": []}
             self.events.diagnosed(status.since, answer)
 
@@ -116,7 +116,7 @@ class Watch:
 
 
 def watch_record(record: Record, watch: Watch, tell: Callable[[Status], None] = lambda status: None) -> None:
-    """Run a watch over a record as if it came in live; `tell` gets what is said of each segment.
+    """Run a watch over a record as if it came in live; `tell` receives the status of each segment.
 
     Raises InputError where the record is shorter than the healthy stretch.
     """

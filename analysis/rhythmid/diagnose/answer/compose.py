@@ -1,4 +1,4 @@
-"""An answer put together from what a free run, or windows, have shown."""
+"""Compose the answer from the results of a free run or of windows."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -40,11 +40,11 @@ Array = NDArray[np.float64]
 SHOWN = 8  # alternatives listed
 ONE_CLOCK = "The clocks of command and measurement agree: an offset between them counts as delay."
 MORE_TIME = "none computed in the time given; a larger --budget tells which experiment separates best"
-RIVALS = 10.0  # difference of the information criterion within which a rival is worth an experiment
+RIVALS = 10.0  # difference of the information criterion up to which a rival is worth an experiment
 
 
 def explanations(contest: Contest, decision: Decision) -> tuple[Explanation, ...]:
-    """All hypotheses as the answer lists them, the best first."""
+    """All hypotheses in the form that the answer lists, best first."""
     ranked = sorted((*contest.hypotheses, *contest.ruled_out), key=lambda one: -one.prediction.score)
     best = ranked[0].prediction
     found = []
@@ -139,7 +139,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
 
 
 def _indistinguishable(model: Model, decision: Decision) -> tuple[tuple[str, ...], ...]:
-    """Groups of names that these records cannot separate: those that the evidence does not, and those that make one model."""
+    """Groups of names that these records cannot separate: by the evidence, or because they form one model."""
     groups = list(decision.equivalent)
     for label in decision.named:
         term = model.term(label)
@@ -158,7 +158,7 @@ def _estimated(model: Model, name: str) -> bool:
 
 
 def held_out_words(records: Sequence[Record], otherwise: str) -> str:
-    """Which records were held out, or what of the others where there are none."""
+    """The names of the held-out records; `otherwise` where there are none."""
     names = dict.fromkeys(record.whole or record.name for record in records)
     return f"held out: {', '.join(names) or otherwise}"
 
@@ -166,7 +166,7 @@ def held_out_words(records: Sequence[Record], otherwise: str) -> str:
 def missing_effects(
     model: Model, decision: Decision, estimate: Callable[[str], Estimate]
 ) -> tuple[MissingEffect, ...]:
-    """The named effects of a fitted model, with the `estimate` of each of their parameters by its name."""
+    """The named effects of a fitted model, with an `estimate` of each parameter, looked up by its name."""
     return tuple(
         MissingEffect(
             term.element.name,
@@ -191,7 +191,7 @@ def estimated(fit: Fit, name: str) -> Estimate:
 
 
 def remainder_of(decision: Decision, drawn: Mapping[str, tuple[Array, Array]]) -> Remainder:
-    """What is left, with the curve that is `drawn` over the quantity that it depends on: values of that, and what is left there."""
+    """What the names leave unexplained; `drawn` gives its curve by quantity, as (values of the quantity, remainder there)."""
     left = decision.unexplained
     grid, force = drawn.get(left.goes_with or "", ((), ()))
     curve = Curve(tuple(map(float, grid)), tuple(map(float, force))) if len(force) else None
@@ -199,14 +199,14 @@ def remainder_of(decision: Decision, drawn: Mapping[str, tuple[Array, Array]]) -
 
 
 def _floor(series: Sequence[Series], noises: Sequence[NoiseModel]) -> float:
-    """Error that noise alone leaves. Repeats that still ring down overstate it, and a fit that is good enough shows less."""
+    """Error due to noise alone. Repeats that still ring down overstate it, so that a good enough fit shows less."""
     variance = min(noise.variance for noise in noises)
     power = sum(one.power(one.used) for one in series) / max(sum(int(one.used.sum()) for one in series), 1)
     return math.sqrt(variance / max(power, 1e-300))
 
 
 def _nominal_error(nominal: Model, fit: Fit, noise: NoiseModel) -> float | None:
-    """Error of the nominal model exactly as given, its initial states fitted; None where it diverges."""
+    """Error of the nominal model with its given parameters, initial states fitted; None where it diverges."""
     values = {name: value.value for name, value in nominal.parameters.items() if name in fit.model.parameters}
     again = rerun(fit.model.with_values(values), fit.run.series, noise, fit.run.max_step)
     return None if again is None else again.nrmse()

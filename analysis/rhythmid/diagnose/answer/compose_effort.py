@@ -1,4 +1,4 @@
-"""An answer put together from what the recorded effort has shown."""
+"""Compose the answer from the results of effort scoring."""
 
 import math
 from collections.abc import Sequence
@@ -47,7 +47,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         slots = ["force"]
         if remainder.goes_with is not None:
             where += f"; it depends on {remainder.goes_with}"
-    # held-out records without an effort judge nothing
+    # held-out records without an effort cannot judge a hypothesis
     unseen = result.heldout is not None
     held = held_out_words(case.holdout, "") if unseen else "held out: every block of the records in its turn"
     return Diagnosis(
@@ -82,7 +82,7 @@ def _error(result: EffortResult, fitted: Fitted) -> float:
 
 
 def _estimate(fitted: Fitted, name: str) -> Estimate:
-    """A parameter; standard deviation 0 where it is fixed, None where the effort does not show it."""
+    """A parameter; standard deviation 0 where it is fixed, None where the effort does not determine it."""
     value = fitted.model.parameters[name]
     std = 0.0 if value.fixed else fitted.std().get(name)
     return Estimate(value.value, std if std is None or math.isfinite(std) else None, value.unit)
@@ -94,7 +94,7 @@ def effort_parameters(fitted: Fitted) -> dict[str, Estimate]:
 
 
 def effort_delays(fitted: Fitted) -> dict:
-    """The alignment of effort and motion in time: the one delay that the effort shows."""
+    """The time offset between effort and motion: the only delay that the effort shows."""
     late = {"value": fitted.fit.alignment, "std": float(fitted.fit.std[0]), "unit": "s"}
     return {
         "input": {},

@@ -1,4 +1,4 @@
-"""What a report says of the nominal model and of the catalogue's elements, however the records were scored."""
+"""Parts of a report that do not depend on how the records were scored: the nominal model and the elements."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -10,7 +10,9 @@ from rhythmid.report.findings import ElementWords
 from rhythmid.report.record_quality import RecordQuality, quality_of
 
 REFITTED = "refitted nominal model"
-CHANGED: dict[Kind, str] = {  # what the final model is called beside it, by the kind of the chosen hypothesis
+CHANGED: dict[
+    Kind, str
+] = {  # name of the final model beside the nominal one, by the kind of the chosen hypothesis
     "freed_value": "with the value set free",
     "delay": "with a longer delay",
     "free_map": "with a free law",
@@ -18,12 +20,12 @@ CHANGED: dict[Kind, str] = {  # what the final model is called beside it, by the
 
 
 def labels_of(kind: Kind) -> tuple[str, str]:
-    """What the models before and after are called in figures."""
+    """Labels of the nominal and the final model in figures."""
     return REFITTED, CHANGED.get(kind, "with the added effect")
 
 
 def listed(names: Sequence[str], most: int = 4) -> str:
-    """Names in words, the last of very many only counted."""
+    """Names joined to text; of more than `most` names, only the number of the last ones is given."""
     if len(names) > most:
         return f"{', '.join(names[: most - 1])} and {len(names) - most + 1} more records"
     return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
@@ -35,7 +37,7 @@ def slots_of(nominal: Model) -> dict[str, tuple[str, ...]]:
 
 
 def given_values(nominal: Model) -> dict[str, dict[str, float | str | None]]:
-    """The nominal model's parameters as its file has them."""
+    """The nominal model's parameters as given in its file."""
     return {n: {"value": v.value, "std": None, "unit": v.unit} for n, v in nominal.parameters.items()}
 
 
@@ -46,7 +48,7 @@ def qualities(records: Sequence[Record], holdout: Sequence[Record]) -> tuple[Rec
 
 
 def words_of(elements: Iterable[Element]) -> dict[str, ElementWords]:
-    """What the catalogue says of these elements, by name."""
+    """Descriptions of these elements in the catalogue, by name."""
     return {
         e.name: ElementWords(
             e.title,
@@ -61,7 +63,7 @@ def words_of(elements: Iterable[Element]) -> dict[str, ElementWords]:
 def hints_of(
     groups: Sequence[Sequence[str]], elements: Iterable[Element]
 ) -> tuple[tuple[str, str, str], ...]:
-    """What tells the members of these groups apart, by the elements' own account."""
+    """What distinguishes the members of each group, as stated by the elements themselves."""
     known: Mapping[str, Element] = {element.name: element for element in elements}
     made = []
     for group in groups:

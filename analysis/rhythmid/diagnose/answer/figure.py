@@ -11,12 +11,15 @@ from rhythmid.report.hypotheses import most_weighed
 from rhythmid.report.quantity import NONE, number, pretty_name, probability
 
 CHOSEN, OTHER = "tab:blue", "0.45"
-LETTERS = 24  # of a line of a hypothesis' name
+LETTERS = 24  # characters a line of a hypothesis' name
 
 
 def draw_hypotheses(axis: Axes, diagnosis: Diagnosis, most: int) -> None:
-    """A dot for each of the `most` best hypotheses with its standard error, on an axis that is linear up to 1 and logarithmic
-    beyond; its probability stands at the right, a dash where it does not share in the evidence."""
+    """Draw a dot with its standard error for each of the `most` best hypotheses.
+
+    The axis is linear up to 1 and logarithmic beyond. The probability stands at the right, or a dash where the
+    hypothesis has no share in the evidence.
+    """
     shown = diagnosis.hypotheses[:most]
     weighed = most_weighed([(one.elements, one.probability) for one in diagnosis.hypotheses])
     chosen = {effect.element for effect in diagnosis.missing}

@@ -1,7 +1,7 @@
-"""The next experiment: of a menu that the machine can play, the one that tells the rivals apart best.
+"""The next experiment: the one from a menu of feasible experiments that discriminates best between the rivals.
 
-T-optimality (A. C. Atkinson, V. V. Fedorov, Biometrika 62 (1975) 57): the expected chi-squared between the outputs that
-two fitted rival models predict. Computed with the models at hand, at sizes scaled to what the records already hold.
+T-optimality (A. C. Atkinson, V. V. Fedorov, Biometrika 62 (1975) 57): maximise the expected chi-squared between the
+outputs that two fitted rival models predict. Amplitudes are scaled to those in the records.
 """
 
 import math
@@ -33,20 +33,20 @@ NONE_FREE = (
     "none needed for these records; releases from larger and smaller amplitudes would exclude smaller effects"
 )
 MORE_FREE = "repeat the records with releases from larger and smaller amplitudes"
-# of the largest amplitude in the records: laws of position and of speed part where both are far from what was seen
+# of the largest amplitude in the records: laws of position and of speed differ most far from the recorded amplitudes
 RELEASES = (0.3, 3.0)
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """An experiment of the menu with the chi-squared by which it is expected to separate the two best rivals."""
+    """An experiment of the menu, with the chi-squared by which it is expected to separate the two best rivals."""
 
     words: str
     chi2: float
 
 
 def _menu(effort: float, frequency: float, length: float, highest: float) -> list[tuple[str, dict, float]]:
-    """(words, excitation, factor on the forcing) for a machine of this size; nothing beyond the `highest` frequency."""
+    """(words, excitation, factor on the forcing) for a machine of this size, up to the frequency `highest` [Hz]."""
     top, above = min(7.0 * frequency, highest), min(21.0 * frequency, highest)
     found: list[tuple[str, dict, float]] = []
     for factor in (0.3, 1.0, 3.0):
@@ -66,7 +66,7 @@ def _menu(effort: float, frequency: float, length: float, highest: float) -> lis
 
 @dataclass(frozen=True)
 class _Experiment:
-    """A record as it would be: its inputs in `series`; where the machine is let go at rest, the position `released` [its unit]."""
+    """A planned record: its inputs in `series`, and for a release from rest the position `released` [its unit]."""
 
     words: str
     series: Series
@@ -85,9 +85,9 @@ def _predicted(trial: Trial, experiment: _Experiment, variance: float, step: flo
 
 
 def _releases(sizes: Scales, model: Model, longest: Series) -> list[_Experiment]:
-    """Releases at rest, for a machine that nothing drives: from a smaller and from a larger amplitude than the records have.
+    """Releases from rest for an undriven machine, from a smaller and a larger amplitude than in the records.
 
-    An angle is turned no further than to the other side, from where a pendulum falls as far as it can.
+    An angle is turned by half a turn at most: from there a pendulum falls the longest way.
     """
     largest = 0.5 * (sizes.high - sizes.low)
     unit = model.units.position
@@ -108,7 +108,7 @@ def _releases(sizes: Scales, model: Model, longest: Series) -> list[_Experiment]
 
 
 def _played_menu(sizes: Scales, longest: Series, frequency: float) -> list[_Experiment]:
-    """What a machine that is driven can play."""
+    """Experiments that a driven machine can play."""
     length = min(LENGTH / frequency, longest.time[-1] - longest.time[0])
     found = []
     for words, spec, factor in _menu(sizes.effort, frequency, length, HIGHEST / longest.period):
@@ -119,7 +119,7 @@ def _played_menu(sizes: Scales, longest: Series, frequency: float) -> list[_Expe
 
 
 def _imagined(series: Series, excitation: Excitation, factor: float) -> Series:
-    """The series as it would be with another command and so much of its forcing, in free run, as far as that was recorded."""
+    """The series with another command and its forcing scaled by `factor`, in free run, for the channels recorded."""
     time = np.arange(int(excitation.duration / series.period), dtype=float) * series.period
     forcing = series.forcing
     if forcing is not None:
@@ -134,7 +134,7 @@ def _imagined(series: Series, excitation: Excitation, factor: float) -> Series:
 
 
 def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, step: float) -> list[Proposal]:
-    """The experiments that the machine can play, with what they would tell between two models, the best first.
+    """Feasible experiments with the chi-squared that they are expected to show between two models, best first.
 
     A machine that nothing drives can be released.
     """
@@ -150,7 +150,7 @@ def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, st
         first, second = _predicted(a, one, variance, step), _predicted(b, one, variance, step)
         if first is None or second is None:
             continue
-        # what an unknown start leaves in both has died out by then; a release is known
+        # the transient of an unknown initial state has decayed after a fifth; that of a release is known
         begin = len(first) // 5 if one.released is None else 0
         difference = first[begin:] - second[begin:]
         difference = difference - difference.mean()
@@ -161,7 +161,7 @@ def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, st
 
 
 def next_experiment(found: Search, rivals: Sequence[Trial], series: Sequence[Series], verdict: str) -> str:
-    """One sentence: what to record next, and what it would settle."""
+    """One sentence: what to record next, and which question that decides."""
     best = found.best
     none, more = (NONE_FREE, MORE_FREE) if scales(series, best.model).idle else (NONE, MORE)
     others = [t for t in rivals if set(t.added) != set(best.added)]

@@ -1,4 +1,4 @@
-"""From a diagnosis' answer to the plain data that its report draws."""
+"""Convert a diagnosis' answer into the plain data that its report draws."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -45,9 +45,9 @@ from rhythmid.report.record_quality import quality_of
 from rhythmid.report.run import Compared, Run
 
 Array = NDArray[np.float64]
-INDICES = (0, -1, 1, -2, 2)  # transfer functions that are compared
-RARE = 0.02  # share of the motion at either end where a free function is poorly known
-POINTS = 240  # of a transfer function
+INDICES = (0, -1, 1, -2, 2)  # indices of the harmonic transfer functions that are compared
+RARE = 0.02  # share of the motion's samples at either end where a free function is poorly determined
+POINTS = 240  # points of a transfer function
 
 
 def present(
@@ -61,8 +61,8 @@ def present(
 ) -> Page:
     """The report of an answer.
 
-    `nominal`, `records` and `holdout` are what `diagnose` was given, `command` the command line, `name` the nominal model's;
-    a `comparison` with a simulation is put first.
+    `nominal`, `records` and `holdout` are the arguments that `diagnose` was given; `command` is the command line; `name`
+    is the nominal model's name. A `comparison` with a simulation is put first.
     """
     result = answer.result
     if isinstance(result, FreeRunResult):
@@ -79,7 +79,7 @@ def present(
 def present_comparison(
     found: Comparison, simulation: Record, records: Sequence[Record], command: str = ""
 ) -> Page:
-    """The report of a comparison without a model; `simulation` and `records` are what `compare` was given."""
+    """The report of a comparison without a model; `simulation` and `records` are the arguments of `compare`."""
     quality = [quality_of(simulation, "simulation"), *(quality_of(one, "recording") for one in records)]
     return comparison_page(found.to_dict(), run_of(found), found.unit, quality, command)
 
@@ -93,7 +93,7 @@ def findings(
     command: str = "",
     name: str = "the nominal model",
 ) -> Findings:
-    """What the report shows of a free run or of windows, as plain data; arguments as for `present`."""
+    """The content of the report for free-run or window scoring, as plain data; arguments as for `present`."""
     found = result.search
     pumpings = {id(record): active_pumping(record) for record in (*records, *holdout)}
     chosen = result.selection.chosen
@@ -148,7 +148,7 @@ def findings(
 
 
 def _correlation(fit: Fit) -> Correlation | None:
-    """Of the parameters that were fitted; None for a single one."""
+    """Correlation of the fitted parameters; None for a single one."""
     if len(fit.names) < 2:
         return None
     units = [fit.model.parameters[name].unit for name in fit.names]
@@ -172,8 +172,10 @@ def _functions(
     paths = {"position": [run.position for run in runs], "velocity": [run.velocity for run in runs]}
 
     def shape(one: Dependence) -> tuple[Array, Array]:
-        """The curve where it is well known, less what the model's own parameters can take up: an offset, and a slope over
-        position or speed."""
+        """The well-determined part of the curve, without what the model's own parameters can absorb.
+
+        These absorb an offset, and over position or speed also a slope.
+        """
         if not len(one.force):
             return one.grid, one.force
         known = np.arange(len(one.grid)) < len(one.grid) - 1  # the splines end before the last point
@@ -208,8 +210,10 @@ def _functions(
 def _transfer(
     found: Search, pumpings: Sequence[Pumping], series: Sequence[Series], nominal: Model
 ) -> TransferChange | str:
-    """Transfer functions of the refitted nominal and the final model around the cycle of the first forced record, or, where
-    no forcing was recorded, around rest; the reason where there are none."""
+    """Transfer functions of the refitted nominal and the final model, or the reason why there are none.
+
+    They are linearised around the cycle of the first forced record, or around rest where no forcing was recorded.
+    """
     if any(one.kind != "force" for one in series):
         return "transfer functions are stated for a force as input, and these records have another"
     if not pumpings and all(one.command is None for one in series):

@@ -1,4 +1,4 @@
-"""From an answer that was scored by effort to the plain data that its report draws."""
+"""Convert an answer from effort scoring into the plain data that its report draws."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -40,7 +40,7 @@ def effort_findings(
     command: str = "",
     name: str = "the nominal model",
 ) -> Findings:
-    """What the report shows, as plain data: recorded effort beside what the models predict. Arguments as for `present`."""
+    """The content of the report as plain data: recorded effort beside the models' predictions; arguments as for `present`."""
     before, after = result.nominal, result.chosen
     changed = bool(after.elements)
     labels = labels_of(result.selection.chosen.kind)
@@ -91,9 +91,9 @@ def effort_runs(
     labels: tuple[str, str],
     heldout: bool = False,
 ) -> list[Run]:
-    """Every stretch of the records: its effort as recorded and as two fits predict it, below the bandwidth.
+    """Recorded and predicted effort of every stretch of the records, below the bandwidth.
 
-    Errors are shares of `size`. Samples at which the machine sticks are drawn and count for nothing.
+    Two fits are shown. Errors are shares of `size`. Samples at which the machine sticks are drawn but not scored.
     """
     predicted = [_along(balance, before), None if after is None else _along(balance, after)]
     found: list[Run] = []
@@ -125,7 +125,7 @@ def effort_runs(
 
 
 def _along(balance: Balance, fitted: Fitted) -> list[Array]:
-    """The effort (n,) that a fit predicts at every sample of each stretch."""
+    """The effort (n,) that a fit predicts at every sample, for each stretch."""
     model, alignment = fitted.fit.model, fitted.fit.alignment
     late, made = balance.later(model, alignment), []
     changes = balance.moved(model, alignment) or len(balance.motions) * [0.0]
@@ -137,14 +137,14 @@ def _along(balance: Balance, fitted: Fitted) -> list[Array]:
 
 
 def _named(balance: Balance, index: int) -> str:
-    """Name of a stretch: its record's, and which part of that it is where there are several."""
+    """Name of a stretch: its record's name, and the number of the part where a record has several."""
     motion = balance.motions[index]
     same = [i for i, one in enumerate(balance.motions) if one.record == motion.record]
     return motion.name if len(same) == 1 else f"{motion.name}, part {same.index(index) + 1}"
 
 
 def _functions(result: EffortResult, nominal: Model, unit: str) -> tuple[FreeFunction, ...]:
-    """Mean of what the nominal and the final model leave of the effort, over each quantity."""
+    """Mean residual effort of the nominal and of the final model over each quantity."""
     first = remainder_of(result.search.balance, result.nominal)
     later = {curve.quantity: curve for curve in result.remainder}
     length = nominal.units.position

@@ -1,4 +1,4 @@
-"""A diagnosis on the terminal: the verdict first, then names, hypotheses, what is left, and what is not believed."""
+"""Print a diagnosis: the verdict first, then names, hypotheses, the remainder, and the rejected hypotheses."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -15,7 +15,7 @@ from rhythmid.report.terminal_table import print_estimates, print_table
 HYPOTHESES_SHOWN = 6
 REJECTIONS_SHOWN = 5
 NOMINAL = "nominal model"
-LEAST_PROBABILITY = 1e-3  # probability, of itself or of the contrary, below which only that is told
+LEAST_PROBABILITY = 1e-3  # probabilities below this, or within it of 1, are printed as a bound only
 
 
 def show(found: Diagnosis, console: Console) -> None:
@@ -26,7 +26,7 @@ def show(found: Diagnosis, console: Console) -> None:
     lines.said("where", found.location.where)
     for effect in found.missing:
         sizes = f"{_percent(effect.share)} of the mismatch"
-        if found.verdict == "missing_physics":  # else the verdict does not stand by the name
+        if found.verdict == "missing_physics":  # with other verdicts the answer does not state the name
             sizes = f"probability {_probability(effect.probability)}, {sizes}"
         lines.told(effect.element, f"{effect.equation}   ({sizes})")
         print_estimates(
@@ -45,7 +45,7 @@ def show(found: Diagnosis, console: Console) -> None:
     lines.said("scored", scoring_words(found.scoring))
     for name, fit in found.fit.items():
         if name == "augmented" and fit == found.refitted_nominal:
-            continue  # nothing was added
+            continue  # the same model as the refitted nominal one
         held = NONE if fit.heldout_nrmse is None else f"{fit.heldout_nrmse:.5f}"
         lines.said(name.replace("_", " "), f"NRMSE {fit.train_nrmse:.5f} on fitted data, {held} held out")
     for label, group in (
@@ -62,7 +62,7 @@ def show(found: Diagnosis, console: Console) -> None:
 
 
 class _Lines:
-    """Lines of a console that begin with a label; nothing in them is markup."""
+    """Console lines that begin with a label; text is printed without interpreting markup."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -101,12 +101,12 @@ def _print_hypotheses(found: Diagnosis, console: Console) -> None:
 
 
 def _is_chosen(found: Diagnosis, one: Explanation) -> bool:
-    """Whether a hypothesis is the one that the answer was made from."""
+    """Whether a hypothesis is the one that the answer is based on."""
     return sorted(one.elements) == sorted(found.chosen)
 
 
 def remainder_words(left: Remainder) -> str:
-    """What the names leave, in words."""
+    """The remainder that the named effects leave, in words."""
     if not left.significant:
         return "nothing that any free function predicts better than chance"
     return f"{_percent(left.share)} of the mismatch, which depends on {left.goes_with}"
@@ -122,8 +122,11 @@ def scoring_words(scored: Scored) -> str:
 
 
 def told_rejections(found: Diagnosis) -> list[Rejection]:
-    """The rejections in the order of the hypotheses, without those of hypotheses that are told as indistinguishable from the chosen one:
-    what speaks against them is only that it is simpler."""
+    """The rejections in the order of the hypotheses.
+
+    Hypotheses reported as indistinguishable from the chosen one are left out: they are rejected only because the chosen
+    one is simpler.
+    """
     rank = {tuple(sorted(one.elements)): place for place, one in enumerate(found.hypotheses)}
     against = [
         row
@@ -134,7 +137,7 @@ def told_rejections(found: Diagnosis) -> list[Rejection]:
 
 
 def rejection_words(rejections: Sequence[Rejection]) -> list[str]:
-    """The hypotheses that are not believed with the first reason of each; a few, and how many more there are."""
+    """The first rejected hypotheses, each with its first reason, and the number of further ones."""
     reasons: dict[tuple[str, ...], str] = {}
     for row in rejections:
         reasons.setdefault(row.hypothesis, row.reason)
@@ -149,14 +152,14 @@ def rejection_words(rejections: Sequence[Rejection]) -> list[str]:
 
 
 def _worse(difference: float, error: float) -> str:
-    """A difference of log densities with its standard error: whole numbers where it is large."""
+    """A difference of log densities with its standard error, in whole numbers where it is large."""
     if difference >= 10.0:
         return f"{difference:.0f} ± {error:.0f}"
     return f"{difference:.2g} ± {error:.2g}"
 
 
 def _probability(value: float) -> str:
-    """A probability, which evidence never makes 0 or 1."""
+    """A probability; close to 0 or 1 only a bound is given, because evidence never reaches either."""
     if value < LEAST_PROBABILITY:
         return f"< {100.0 * LEAST_PROBABILITY:g} %"
     return (

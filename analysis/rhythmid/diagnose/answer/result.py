@@ -1,6 +1,6 @@
-"""What a diagnosis says, and how it is written as JSON.
+"""The result types of a diagnosis, and their form as JSON.
 
-The types are the contract: `python -m rhythmid.diagnose.answer.result` prints the JSON schema that follows from them.
+The types define the contract: `python -m rhythmid.diagnose.answer.result` prints the JSON schema derived from them.
 """
 
 import json
@@ -25,8 +25,11 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Detection:
-    """Whether anything is missing: p-value of the score tests over the whole catalogue (None where none were made), and errors
-    as shares of the motion or of the effort."""
+    """Whether anything is missing.
+
+    `p_value` is that of the score tests over the whole catalogue, None where none were made. Errors are shares of the
+    motion or of the effort.
+    """
 
     p_value: float | None
     nominal_nrmse: float | None
@@ -36,7 +39,7 @@ class Detection:
 
 @dataclass(frozen=True)
 class Location:
-    """Which slot of the signal path is deficient, in one sentence, with what speaks for it."""
+    """The deficient slot of the signal path, in one sentence, with the evidence for it."""
 
     slot: str | None
     where: str
@@ -45,8 +48,10 @@ class Location:
 
 @dataclass(frozen=True)
 class MissingEffect:
-    """An effect that the nominal model lacks: the share of the mismatch on held-out data that it explains, and the probability
-    that this is its name."""
+    """An effect that the nominal model lacks.
+
+    `share` is the part of the mismatch on held-out data that it explains, `probability` that of its name.
+    """
 
     element: str
     slot: str
@@ -58,8 +63,11 @@ class MissingEffect:
 
 @dataclass(frozen=True)
 class Explanation:
-    """One hypothesis: the log density with which it predicts data that its fit has not seen, how much less that is than the best
-    one's with the standard error of the difference, its probability, and its error on held-out data."""
+    """One hypothesis with its score on data that its fit has not seen.
+
+    The score is a log predictive density. It comes with its difference to the best hypothesis, the standard error of
+    that difference, the probability of the hypothesis, and its error on held-out data.
+    """
 
     elements: tuple[str, ...]
     kind: Kind
@@ -81,7 +89,7 @@ class Alternative:
 
 @dataclass(frozen=True)
 class FitQuality:
-    """Error on the records that the fit saw and on those it did not, as a share of the motion or of the effort."""
+    """Error on the fitted records and on held-out ones, as a share of the motion or of the effort."""
 
     train_nrmse: float
     heldout_nrmse: float | None
@@ -89,7 +97,7 @@ class FitQuality:
 
 @dataclass(frozen=True)
 class Curve:
-    """A function of one quantity: what is left as a force, or for a sensor error in the measurement's unit, over the quantity."""
+    """The remainder as a function of one quantity: a force, or for a sensor error a value in the measurement's unit."""
 
     grid: tuple[float, ...]
     force: tuple[float, ...]
@@ -97,8 +105,11 @@ class Curve:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What the named effects leave and a free map predicts: its share of the mismatch, whether that is more than chance, the
-    quantity that it depends on most and, for a function of one quantity, its curve."""
+    """What the named effects leave unexplained and a free map predicts.
+
+    Its share of the mismatch, whether that is significant, the quantity on which it depends most and, for a function of
+    one quantity, its curve.
+    """
 
     share: float
     significant: bool
@@ -108,7 +119,7 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Scored:
-    """How records were scored: in free run, in windows or by effort; the bandwidth of effort scoring [Hz]; and why."""
+    """How records were scored: in free run, in windows or by effort; the bandwidth [Hz] of effort scoring; the reason."""
 
     kind: ScoringKind
     bandwidth: float | None
@@ -117,22 +128,24 @@ class Scored:
 
 @dataclass(frozen=True)
 class Untried:
-    """A candidate that was not tried, or what else was not, and the reason."""
+    """A candidate, or another step, that was not tried, and the reason."""
 
     name: str
     reason: str
 
 
 def settled(verdict: Verdict, indistinguishable: tuple[tuple[str, ...], ...]) -> bool:
-    """Whether nothing has to be recorded to make sure of an answer: it names effects, and no others might stand in their place."""
+    """Whether an answer needs no further record: it names effects, and no other names explain the records as well."""
     return verdict == "missing_physics" and not indistinguishable
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The answer to: which physics does the model lack? `chosen` are the elements of the hypothesis that `augmented`, `parameters` and
-    `remainder` are of, nothing where that is the nominal model. `families` are those of its effects: the kind of what is missing may be
-    certain where the law is not."""
+    """The answer to: which physics does the model lack?
+
+    `chosen` are the elements of the hypothesis that `augmented`, `parameters` and `remainder` describe; it is empty where
+    that is the nominal model. `families` are those of its effects: the family may be certain where the law is not.
+    """
 
     verdict: Verdict
     summary: str
@@ -170,7 +183,7 @@ class Diagnosis:
 
     @property
     def settled(self) -> bool:
-        """Whether nothing has to be recorded to make sure of it."""
+        """Whether the answer needs no further record."""
         return settled(self.verdict, self.indistinguishable)
 
     def to_dict(self) -> dict[str, Any]:
@@ -182,7 +195,7 @@ ANSWER = TypeAdapter(Diagnosis)
 
 
 def schema() -> dict[str, Any]:
-    """JSON schema of `to_dict`: any number may be null there, for one that is not finite."""
+    """JSON schema of `to_dict`; any number may be null there, because a number that is not finite is written as null."""
     return _nullable(ANSWER.json_schema(mode="serialization"))
 
 

@@ -1,4 +1,4 @@
-"""A diagnosis in sentences: where, what, how much better, and which nominal values the records contradict."""
+"""The sentences of a diagnosis: where, what, how much better, and which nominal values the records contradict."""
 
 import math
 from collections import Counter
@@ -47,12 +47,12 @@ def location_of(
 
 
 def _begun(words: str) -> str:
-    """A sentence with its first letter raised."""
+    """A sentence with its first letter in upper case."""
     return words[:1].upper() + words[1:]
 
 
 def _some_form_of(decision: Decision, stated: Sequence[str] = ()) -> str:
-    """The families that are probable enough to be told, of which no law is `stated`; nothing where there are none."""
+    """Families that are probable enough to be reported and have no `stated` law; empty where there are none."""
     told = [
         f"some form of {one.family} ({100.0 * one.probability:.0f} %)"
         for one in decision.families
@@ -76,7 +76,8 @@ def summary_of(
 ) -> str:
     """The verdict in a sentence or two.
 
-    `whole` is what errors are a share of; `freed` tells of the fixed value that the chosen hypothesis frees, if it does.
+    `whole` is the quantity that errors are a share of. `freed` describes the fixed value that the chosen hypothesis
+    frees, if any.
     """
     names = listed([effect.element for effect in missing])
     value = "" if freed is None else _begun(freed)
@@ -139,7 +140,7 @@ def summary_of(
 
 
 def listed(names: Sequence[str], word: str = "and") -> str:
-    """Names in words: "a", "a and b", "a, b and c"; with "or" where one of them is meant. One that comes again is told with its number."""
+    """Names in words: "a", "a and b", "a, b and c"; `word` may be "or". A repeated name gets a number."""
     said = [
         in_words(name) if count == 1 else f"{in_words(name)} ({count} of them)"
         for name, count in Counter(names).items()
@@ -148,7 +149,7 @@ def listed(names: Sequence[str], word: str = "and") -> str:
 
 
 def freed_value(nominal: Model, fitted: Model, chosen: Hypothesis) -> str | None:
-    """Sentences about the fixed values that the chosen hypothesis frees beside its effects; None where it frees none."""
+    """Sentences about the fixed values that the chosen hypothesis frees besides its effects; None where it frees none."""
     if chosen.kind != "freed_value":
         return None
     effects = [label for label in chosen.elements if fitted.term(label) is not None]
@@ -159,7 +160,9 @@ def freed_value(nominal: Model, fitted: Model, chosen: Hypothesis) -> str | None
         for name, held in ((name, nominal.parameters[name]) for name in freed)
     ]
     what = "that value" if len(freed) == 1 else "these values"
-    file = any(name.startswith(f"{BODY}.") for name in freed)  # a body's file says nothing of what is free
+    file = any(
+        name.startswith(f"{BODY}.") for name in freed
+    )  # the file of a body does not mark free parameters
     return (
         f"{'. '.join(values)}, and that{beside} predicts the records better than any effect does while it is held: check {what}"
         f"{'' if file else ', or drop its ' + repr('fixed: true')}."
@@ -167,7 +170,7 @@ def freed_value(nominal: Model, fitted: Model, chosen: Hypothesis) -> str | None
 
 
 def recalibrated(nominal: Model, fitted: Model, stds: Mapping[str, float]) -> tuple[str, ...]:
-    """Nominal values that the records contradict, as sentences; `stds` are standard deviations of what was estimated."""
+    """Nominal values that the records contradict, as sentences; `stds` are standard deviations of the estimated parameters, by name."""
     said = []
     for name, value in nominal.parameters.items():
         if name not in stds or name not in fitted.parameters:

@@ -1,7 +1,8 @@
-"""What an actuator's law does to the recorded efforts beyond a gain.
+"""Share of an actuator's law, along the recorded efforts, that is more than a gain.
 
-The balance computes the effort along a smoothed motion, which passes through all values between the levels of a switched effort.
-The actuator never met those. On two levels of one size every odd law is a gain, which the inertia and the forces have already.
+The balance computes the effort along a smoothed motion. That effort passes through all values between the levels of a
+switched effort, which the actuator never saw. On two levels ±a every odd law is a gain, which the inertia and the forces
+already contain.
 """
 
 import math
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def recorded_efforts(records: Sequence[Record], model: Model) -> Array | None:
-    """The efforts (n,) at their own stamps; None where nothing was recorded, or a forcing is added to what was."""
+    """The efforts (n,) at their own stamps; None where none was recorded, or where a forcing adds to the recorded one."""
     found: list[Array] = []
     for record in records:
         channel = effort_channel(record, model)
@@ -34,8 +35,20 @@ def recorded_efforts(records: Sequence[Record], model: Model) -> Array | None:
 
 
 def beyond_gain(model: Model, label: str, sizes: Scales, recorded: Array, required: Array) -> float:
-    """Mean square of what a law of the actuator does to the `recorded` efforts (n,) beyond a gain and a constant, as a share of what
-    it does to those (m,) that the model requires; infinite for what is no static law of the effort, or straight there."""
+    """Action of an actuator's law beyond a gain and a constant, recorded efforts relative to required ones.
+
+    Parameters
+    ----------
+    model, label : the model and the label of the law.
+    sizes : scales of the records.
+    recorded : (n,) recorded efforts.
+    required : (m,) efforts that the model requires.
+
+    Returns
+    -------
+    float
+        Ratio of the mean squares; infinite for an effect that is no static law of the effort, or a straight one.
+    """
     term = model.term(label)
     if term is None:
         return math.inf

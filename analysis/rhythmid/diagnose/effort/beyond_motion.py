@@ -1,7 +1,7 @@
-"""What an effect that changes with time does to the effort beyond any law of the motion.
+"""Share of a time-dependent effect that no law of the motion reproduces.
 
-Where a motion is made once there and once back, what comes later also turns the other way: a fading actuator and a friction that differs by
-direction are then the same. The motion has to come again for time to be told from it.
+If the motion goes forth and back only once, a later time is also another direction: a fading actuator and a friction that
+differs by direction are then equivalent. Only a repeated motion separates time from direction.
 """
 
 import math
@@ -21,15 +21,17 @@ Array = NDArray[np.float64]
 
 
 def beyond_motion(balance: Balance, model: Model, label: str, plain: Linearised, mapped: Linearised) -> float:
-    """Mean square of what an effect does to the effort that no free map of the motion does, as a share of what the parameters of the
-    model do not; infinite for an effect that does not change with time.
+    """Share of an effect on the effort that no free map of the motion reproduces.
+
+    Ratio of two mean squares: what the fit with a free map leaves of the effect over what the nominal parameters leave of
+    it. Infinite for an effect that does not change with time.
 
     Parameters
     ----------
     balance, model, label
         The rows, the fitted model and the effect's label.
     plain, mapped
-        The nominal fit, and the same with a free map beside its parameters.
+        The nominal fit, and the same fit with a free map beside its parameters.
     """
     term = model.term(label)
     if term is None or not changes_with_time(term.element, term.numbers, model):
@@ -40,7 +42,7 @@ def beyond_motion(balance: Balance, model: Model, label: str, plain: Linearised,
 
 
 def changes_with_time(element: Element, values: dict[str, float], model: Model) -> bool:
-    """Whether an element without memory does something else at another time."""
+    """Whether the output of an element without memory depends on time."""
     if element.kernel is None or element.own or element.history or element.states or element.memories:
         return False
     rng = np.random.default_rng(0)
@@ -52,7 +54,7 @@ def changes_with_time(element: Element, values: dict[str, float], model: Model) 
 
 
 def _beyond(effect: Array, columns: Array) -> float:
-    """Mean square of what columns (n, p) leave of an effect (n,)."""
+    """Mean square of an effect (n,) after projecting columns (n, p) out of it."""
     norms = np.linalg.norm(columns, axis=0)
     norms[norms == 0.0] = 1.0
     scaled = columns / norms

@@ -1,4 +1,4 @@
-"""What may be added to a model to explain an effort: elements of the catalogue, fixed values set free, a longer delay."""
+"""Possible additions to a model that explain an effort: elements of the catalogue, freed values, a longer delay."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -20,16 +20,18 @@ from rhythmid.model import INERTIA, Model
 from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
-SEEN = ("force", "actuator")  # slots whose elements the balance of effort sees
-# and where the effort is what a controller makes of its reference
+SEEN = ("force", "actuator")  # slots whose elements show in the effort balance
+# the same where a controller computes the effort from its reference
 SEEN_BY_REFERENCE = (*SEEN, "command")
-LARGEST = 30.0  # times its first guess that an effect is started at, at most
-LEAST_START = 0.05  # of its first guess, at least: at nothing a shape has no derivative
+LARGEST = 30.0  # largest start of an effect, times its first guess
+LEAST_START = (
+    0.05  # smallest start, share of its first guess: at zero the effect's shape parameters have no derivative
+)
 
 
 @dataclass(frozen=True)
 class Start:
-    """One first guess of an addition: `values` of an element, or of the one parameter that is set free."""
+    """One first guess of an addition: the `values` of an element, or of the one parameter that is freed."""
 
     kind: Kind
     name: str
@@ -39,7 +41,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Screened:
-    """A first guess, by how much it would lower the cost of its parent if nothing but its size were fitted, and that size."""
+    """A first guess, the reduction of its parent's cost if only its size were fitted, and the factor for that size."""
 
     start: Start
     gain: float
@@ -47,7 +49,7 @@ class Screened:
 
 
 def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balance) -> list[Start]:
-    """All first guesses of what may be missing from the model and can be seen in the effort."""
+    """First guesses of all possible additions that show in the effort."""
     found: list[Start] = []
     driven = any(motion.driven_by_base for motion in balance.motions)
     for element, values in candidates(catalogue.within(sizes), model.setting, sizes).tried:
@@ -65,7 +67,7 @@ def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
 
 
 def _seen(element: Element, balance: Balance) -> bool:
-    """Whether the balance of effort can tell of an element: of one without a kernel, which delays, where a reference is known."""
+    """Whether the effort balance shows an element. A delay, which has no kernel, shows where a reference is known."""
     if (
         element.slot not in (SEEN_BY_REFERENCE if balance.by_reference else SEEN)
         or element.acts == "feedback"
@@ -77,8 +79,11 @@ def _seen(element: Element, balance: Balance) -> bool:
 
 
 def not_tried(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balance) -> dict[str, str]:
-    """Why candidates of the catalogue take no part, by name: those that the model or the motion rules out, and those that the
-    balance of effort cannot see, which are all that commands, sensors and clocks do."""
+    """Candidates that are not tried, by name, with the reason.
+
+    The model or the motion rules them out, or they do not show in the effort balance, as elements of commands, sensors
+    and clocks do not.
+    """
     reasons = dict(candidates(catalogue.within(sizes), model.setting, sizes).not_tried)
     for element in catalogue.values():
         if not element.candidate or _seen(element, balance):
@@ -93,8 +98,11 @@ def not_tried(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
 
 
 def fixed_values(balance: Balance, model: Model) -> list[str]:
-    """Fixed values of the model that the effort could tell of, but for choices of form (an exponent, a side) and for zeros of
-    elements, which the file need not have meant; that a link carries no payload is meant."""
+    """Fixed values of the model that the effort can determine.
+
+    Left out are choices of form (an exponent, a side) and zeros of elements, which the file may not have meant. A link's
+    zero payload is kept, because it is meant.
+    """
     links = balance.motions[0].links
     freed = {
         n
@@ -116,7 +124,7 @@ def with_freed(model: Model, names: set[str] | Sequence[str]) -> Model:
 
 
 def extended(model: Model, start: Start, factor: float = 1.0) -> tuple[Model, str]:
-    """The model with the addition, its effect `factor` times the guess, and the label by which the addition goes."""
+    """The model with the addition, scaled to `factor` times the guess, and the label of the addition."""
     if start.element is None:
         return (with_freed(model, [start.name]) if start.kind == "freed_value" else model), start.name
     element, values = start.element, dict(start.values)
@@ -130,16 +138,14 @@ def extended(model: Model, start: Start, factor: float = 1.0) -> tuple[Model, st
         values[name] = float(np.clip(value, low + margin if low > -math.inf else low, high))
     grown = model.with_element(element, values)
     label = grown.terms[-1].label
-    if (
-        element.clock
-    ):  # its ticks hang on it all over the record: it is one of the usual ones, or found by no descent
+    if element.clock:  # all ticks of the record depend on the period: it is one of the usual values, and no descent finds another
         own = f"{label}.{element.clock}"
         grown = grown.with_parameters({own: replace(grown.parameters[own], fixed=True)})
     return (_alone(grown, element) if element.acts == "constraint" else grown), label
 
 
 def _alone(model: Model, constraint: Element) -> Model:
-    """The model without the laws that a constraint contains, which then say nothing: an engine's joint has one dry friction."""
+    """The model with the laws that a constraint contains set to zero effect: a simulator's joint has one dry friction."""
     absent = {}
     for term in model.terms:
         element = term.element
@@ -150,13 +156,14 @@ def _alone(model: Model, constraint: Element) -> Model:
 
 
 def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list[Screened]:
-    """The best first guess of every addition to a fitted model, best addition first: a score test in the effort's own terms.
+    """Score test in terms of the effort: the best first guess of every addition to a fitted model, best addition first.
 
-    What ends at a bound takes no part: it stays there beside a small addition, though its column may be that of the addition.
+    Parameters at a bound are not projected out. They stay there beside a small addition, though their columns may be
+    parallel to that of the addition.
     """
     weight = weights_of(parent.residual, parent.scale) / parent.scale**2
     root = np.sqrt(weight)
-    # priors are rows of their own
+    # priors are additional rows
     inside = ~parent.at_limit
     rows = np.vstack([parent.jacobian * root[:, None], np.diag(np.sqrt(parent.precision))])
     basis = orthonormal(rows[:, inside])
@@ -166,7 +173,7 @@ def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list
     best: dict[tuple[str, str], Screened] = {}
     for start in starts:
         if start.kind == "delay":
-            best[start.kind, start.name] = Screened(start, math.inf, 1.0)  # has its own scan
+            best[start.kind, start.name] = Screened(start, math.inf, 1.0)  # sought by a scan of its own
             continue
         column = _column(balance, parent, start, base)
         if not _says_something(column):
@@ -191,7 +198,7 @@ def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list
 
 
 def columns_of(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> Array:
-    """Changes (n, m) of the predicted effort that additions make, those that say nothing left out."""
+    """Changes (n, m) of the predicted effort by additions, without those that are zero or not finite."""
     base = balance.predicted(parent.model, parent.alignment)
     seen = list(filter(_says_something, (_column(balance, parent, start, base) for start in starts)))
     return np.column_stack(seen) if seen else np.zeros((len(base), 0))
@@ -202,7 +209,7 @@ def _says_something(column: Array) -> bool:
 
 
 def _column(balance: Balance, parent: EffortFit, start: Start, base: Array) -> Array:
-    """Change (n,) of the predicted effort that an addition makes."""
+    """Change (n,) of the predicted effort by an addition."""
     if start.element is None:
         value = parent.model.value(start.name)
         step = 1e-3 * (abs(value) or 1.0)
@@ -213,7 +220,7 @@ def _column(balance: Balance, parent: EffortFit, start: Start, base: Array) -> A
 
 
 def late_start(balance: Balance, parent: EffortFit) -> tuple[Alignment, float]:
-    """What a longer delay may be, and the one [s] that fits best beside the parent's parameters as they stand to first order."""
+    """Allowed range of a longer delay, and the delay [s] that fits best with the parent's parameters to first order."""
     most = max(LONGEST_DELAY / balance.bandwidth.dominant, 2.0 * balance.period)
     usual = Alignment.of(balance)
     required = balance.required(parent.model)
@@ -231,6 +238,6 @@ def late_start(balance: Balance, parent: EffortFit) -> tuple[Alignment, float]:
 
 
 def widest(balance: Balance, column: Array) -> float:
-    """Change of a parameter that moves the effort by its own size; `column` (n,) is the effect for each unit."""
+    """Change of a parameter that changes the effort by the effort's own size; `column` (n,) is the effect per unit."""
     strength = float(np.sqrt(np.mean(column**2)))
     return size_of(balance) / strength if strength > 0.0 else math.inf

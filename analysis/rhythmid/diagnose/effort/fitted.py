@@ -1,4 +1,4 @@
-"""A hypothesis about an effort, fitted, in the form that the evidence takes."""
+"""A fitted hypothesis about an effort, in the form that the evidence needs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -18,8 +18,8 @@ from rhythmid.value import Prior
 class Fitted:
     """One explanation of the effort.
 
-    `elements` are the labels of what was added (a freed value's name; `input_delay.delay` for a longer delay), `priors` what
-    its fit knew before the data, `shape` statistics of the effects themselves, by the name of the rule that looks at them.
+    `elements` are the labels of the additions: a freed value's name, or `input_delay.delay` for a longer delay. `priors` are
+    the priors of its fit. `shape` holds statistics of the effects by the name of the rule that uses them.
     """
 
     elements: tuple[str, ...]
@@ -31,7 +31,7 @@ class Fitted:
 
     @classmethod
     def of(cls, elements: tuple[str, ...], kind: Kind, fit: EffortFit, priors: dict[str, Prior]) -> "Fitted":
-        """The fit with what ends at a bound taken for fixed there."""
+        """The hypothesis of a fit; a parameter that ends at a bound counts as fixed there."""
         inside = ~fit.at_limit
         linearised = Linearised(
             fit.residual, fit.jacobian[:, inside], fit.precision[inside], fit.departure[inside]
@@ -40,7 +40,7 @@ class Fitted:
 
     @property
     def model(self) -> Model:
-        """The fitted model; a delay that was found beyond its own is in its input delay, where it has one."""
+        """The fitted model; the additional delay found by the fit is added to its input delay, if it has one."""
         model, name = self.fit.model, INPUT_DELAY
         if name not in model.parameters or controlled(model):
             return model
@@ -56,7 +56,7 @@ class Fitted:
         return len(self.fit.names)
 
     def claimed(self, prediction: Prediction, nrmse: float | None = None) -> Hypothesis:
-        """The hypothesis with what it predicts, and its error on held-out data as a share of the effort's variation."""
+        """The hypothesis with its prediction, and its error on held-out data relative to the effort's variation."""
         model = self.fit.model
         values = {name: model.value(name) for name in self.fit.names}
         return Hypothesis.of(

@@ -1,4 +1,4 @@
-"""Forms of one thing: laws of one family, or of which one is the other's special case."""
+"""Related laws: laws of one family, or of which one is a special case of the other."""
 
 from collections.abc import Sequence
 
@@ -7,18 +7,18 @@ from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.elements.element import Element
 from rhythmid.model import Model
 
-REFINED = 10  # additions that are fitted in earnest in each round: the right one was among the first five of a score test always
+REFINED = 10  # additions that are refitted in each round: the right one was always among the first five of a score test
 
 
 def kin(first: Element, second: Element) -> bool:
-    """Whether two elements are forms of one thing."""
+    """Whether two elements are related laws."""
     if first.name == second.name and first.repeats:
         return False
     return (first.family != "" and first.family == second.family) or contained(first, second)
 
 
 def contained(first: Element, second: Element) -> bool:
-    """Whether one of two elements is the other, or its special case, so that one of them says what both do."""
+    """Whether two elements are the same or one is a special case of the other, so that one of them covers both."""
     return (
         first.name == second.name
         or second.name in first.special_case_of
@@ -27,7 +27,7 @@ def contained(first: Element, second: Element) -> bool:
 
 
 def shortlist(screened: Sequence[Screened]) -> list[Screened]:
-    """The additions that are fitted in earnest: the best of the score test, all kin of the best, freed values and the delay."""
+    """The additions to be refitted: the best of the score test, all laws related to the best, freed values, the delay."""
     best = [one for one in screened if one.start.element is not None and one.gain > 0.0]
     chosen = best[:REFINED]
     if best:
@@ -38,7 +38,7 @@ def shortlist(screened: Sequence[Screened]) -> list[Screened]:
 
 
 def at_values_of(rich: Fitted, plain: Fitted) -> Model | None:
-    """The model of a hypothesis with the values that another one has found, whose last law contains its own; None where it does not."""
+    """The model of hypothesis `plain` at the values of `rich`, whose last law contains its own; None where it does not."""
     label, other = plain.elements[-1], rich.elements[-1]
     term, wider = plain.fit.model.term(label), rich.fit.model.term(other)
     if term is None or wider is None or plain.elements[:-1] != rich.elements[:-1]:

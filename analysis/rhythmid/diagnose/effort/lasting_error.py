@@ -1,7 +1,7 @@
-"""The part of an error of effort that lasts: what follows from errors that lie further back than the balance's filter mixes neighbours.
+"""The lasting part of an effort error: the part predicted by errors further back than the balance's filter mixes neighbours.
 
-Noise that went through the filter follows from its own past for as long as the filter remembers, and no longer. What follows from
-earlier errors is no noise: it is something that the model lacks, whatever that is.
+Filtered noise is correlated over the length of the filter, and no further. An error that follows from earlier ones is not
+noise: it shows that the model lacks something.
 """
 
 import math
@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-PAST = 8  # errors that the next one is predicted from: two periods of the filter's cut-off, at 2.5 rows a period and more
-FOLDS = 2  # halves of each record, of which each is predicted with what the other one says
-ROWS = 4 * PAST  # of a record without which it says nothing
+PAST = 8  # past errors that predict the next one: two periods of the filter's cut-off, at 2.5 rows a period and more
+FOLDS = 2  # halves of each record; each is predicted with the coefficients of the other
+ROWS = 4 * PAST  # minimum rows of a record
 
 
 def lasting_share(error: Array, record: NDArray[np.int64], memory: int) -> float:
-    """Share of the rms of an error that follows from errors `memory` rows and more before it; 0 where that predicts nothing.
+    """Share of an error's rms that is predicted by errors `memory` rows and more before it; 0 where nothing is.
 
-    The prediction is linear, and made for each half of every record with coefficients of the other halves, so that chance predicts nothing.
+    The prediction is linear. Each half of every record is predicted with the coefficients of the other halves, so that a
+    chance correlation predicts nothing.
 
     Parameters
     ----------

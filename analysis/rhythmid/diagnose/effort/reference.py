@@ -1,4 +1,4 @@
-"""Unknown physics as a competitor: a model with a free function of the motion beside its own elements."""
+"""Unknown physics as a competing model: a free function of the motion beside the model's own elements."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -16,17 +16,19 @@ from rhythmid.identify.inverse_dynamics.motion import Motion
 from rhythmid.identify.student import scale_of, weights_of
 
 Array = NDArray[np.float64]
-# standard deviations of a map's bends (second differences of a spline's coefficients, or values of a function of the motion and its
-# past), of which cross-validation chooses: shares of the effort's size. The smallest leaves straight lines, the largest a tenth of the
-# effort for every piece
+# candidate standard deviations of a map's bends, as shares of the effort's size; cross-validation selects one. Bends are second
+# differences of a spline's coefficients, or values of a function of the motion and its past. The smallest leaves straight
+# lines, the largest a tenth of the effort for every piece
 RIDGES = (0.3, 0.1, 0.03, 0.01, 0.003)
-STRAIGHT = 3.0  # standard deviation of what is straight, the same: a line may carry all of the effort
-PASSES = 8  # of reweighted least squares
-HISTORY = "the motion and its past"  # what a map of several quantities and their memory depends on
+STRAIGHT = (
+    3.0  # standard deviation of the straight part, in the same unit: a line may carry all of the effort
+)
+PASSES = 8  # iterations of reweighted least squares
+HISTORY = "the motion and its past"  # the quantity of a map of several quantities and their past
 
 
 class Map(Protocol):
-    """Columns of a free function over motions; `bends` (q,) marks those whose size is curvature."""
+    """Columns of a free function along motions; `bends` (q,) marks the columns that describe curvature."""
 
     bends: NDArray[np.bool_]
 
@@ -51,8 +53,10 @@ def map_columns(balance: Balance, fitted: Fitted, free: Map) -> Array:
 
 
 def _with_map(balance: Balance, fitted: Fitted, ridge: float, free: Map, columns: Array) -> Mapped:
-    """The fit with a free map of these `columns` beside its parameters; `ridge` is the standard deviation of the map's bends, as a share
-    of the effort's size."""
+    """The fit with a free map of these `columns` beside its parameters.
+
+    `ridge` is the standard deviation of the map's bends, as a share of the effort's size.
+    """
     base = fitted.linearised
     jacobian = np.hstack([base.jacobian, columns])
     spread = np.where(free.bends, ridge, STRAIGHT) * size_of(balance)
@@ -73,7 +77,7 @@ def _with_map(balance: Balance, fitted: Fitted, ridge: float, free: Map, columns
 
 
 def residual_with_map(heldout: Balance, fitted: Fitted, found: Mapped) -> Array:
-    """Predicted less recorded effort (n,) of held-out rows, by a fit with a free map beside it."""
+    """Predicted less recorded effort (n,) of held-out rows, for a fit with a free map."""
     residual, jacobian = linearise(heldout, fitted.fit.model, fitted.fit.names, fitted.fit.alignment)
     own = jacobian[:, ~fitted.fit.at_limit]
     values = found.linearised.departure
@@ -82,18 +86,18 @@ def residual_with_map(heldout: Balance, fitted: Fitted, found: Mapped) -> Array:
 
 
 def reference_of(balance: Balance, fitted: Fitted, blocks: Blocks, beside: str | None = None) -> Mapped:
-    """Curves over the quantities of the motion; with the motion of the joint `beside` this one, where one is named."""
+    """A fit with curves over the quantities of the motion, including the motion of the joint `beside`, if given."""
     return _best(balance, fitted, blocks, FreeMap(list(balance.motions), size_of(balance), beside))
 
 
 def history_of(balance: Balance, fitted: Fitted, blocks: Blocks) -> Mapped:
-    """A free function of the motion and its past."""
+    """A fit with a free function of the motion and its past."""
     loads = balance.required(fitted.fit.model)
     return _best(balance, fitted, blocks, HistoryMap(balance.motions, balance.places, loads))
 
 
 def _best(balance: Balance, fitted: Fitted, blocks: Blocks, free: Map) -> Mapped:
-    """The map with the ridge that predicts best what it has not seen."""
+    """The map with the ridge that predicts held-out blocks best."""
     columns = map_columns(balance, fitted, free)
     made = [_with_map(balance, fitted, ridge, free, columns) for ridge in RIDGES]
     found = predict([one.linearised for one in made], blocks, balance.record)

@@ -1,4 +1,4 @@
-"""What an explanation of the effort leaves: with which quantity it goes, and the curve that it draws over that."""
+"""The residual effort of an explanation: the quantity that it depends on, and its curve over that quantity."""
 
 from dataclasses import dataclass, replace
 
@@ -9,13 +9,16 @@ from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.identify.inverse_dynamics.balance import Balance
 
 Array = NDArray[np.float64]
-BINS = 16  # of equal numbers of rows: enough for a curve, each with enough rows for a mean
+BINS = 16  # bins with equal numbers of rows: enough for a curve, each with enough rows for a mean
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Mean residual effort (b,) over values (b,) of a quantity; `share` of its power is explained by the curve beyond what bins
-    explain by chance. `joint` is the other one whose speed the quantity is."""
+    """Mean residual effort (b,) over values (b,) of a quantity.
+
+    `share` is the part of the residual's power that the curve explains beyond chance. `joint` is the other joint whose speed
+    the quantity is.
+    """
 
     quantity: str
     value: Array
@@ -25,8 +28,10 @@ class Curve:
 
 
 def remainder_of(balance: Balance, fitted: Fitted) -> tuple[Curve, ...]:
-    """What a hypothesis leaves of the recorded effort, recorded less predicted, over speed, position, acceleration, load and time, and
-    over the speeds of other joints; the quantity of which it is most nearly a function first."""
+    """Curves of the residual effort (recorded less predicted), the most informative quantity first.
+
+    Quantities are speed, position, acceleration, load and time, and the speeds of other joints.
+    """
     left = -fitted.fit.residual
     mechanical = balance.mechanical
     time = np.concatenate([m.time[p] for m, p in zip(balance.motions, balance.places, strict=True)])

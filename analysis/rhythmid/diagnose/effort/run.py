@@ -1,4 +1,4 @@
-"""Diagnosis by the recorded effort: the search, its hypotheses on data that no fit has seen, and the decision."""
+"""Diagnosis by the recorded effort: the search, the evaluation on data that no fit has seen, and the decision."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -51,8 +51,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class EffortResult:
-    """Everything behind an answer that was scored by effort; `size_errors` are the relative standard deviations of the chosen effects'
-    sizes, by label, and `errors` (rms) those of prediction, by the key of a hypothesis."""
+    """All data behind an answer from effort scoring.
+
+    `size_errors` are the relative standard deviations of the chosen effects' sizes, by label. `errors` are the rms
+    prediction errors, by the key of a hypothesis.
+    """
 
     applicability: Applicability
     search: EffortSearch
@@ -81,7 +84,7 @@ class _Rows:
         fitted: Fitted,
         mapped: Mapped | None = None,
     ) -> CrossValidated:
-        """Errors of prediction of a fit, or of the same with a free map beside its parameters."""
+        """Prediction errors of a fit, or of the same fit with a free map beside its parameters."""
         seen = fitted.linearised if mapped is None else mapped.linearised
         if self.heldout is None:
             return cross_validate(seen, self.blocks)
@@ -96,7 +99,7 @@ class _Rows:
 
     @property
     def judged(self) -> NDArray[np.bool_]:
-        """Rows of held-out records; all, each predicted by the fit that did not see it, where there are none."""
+        """Rows of held-out records; without any, all rows, each predicted by the fit that did not see it."""
         held = self.blocks.fold[self.blocks.block] < 0
         return held if held.any() else ~held
 
@@ -106,7 +109,7 @@ def _rows(case: Case, found: EffortSearch, heldout: Balance | None) -> _Rows:
         try:
             heldout = Balance.of(case.holdout, found.nominal.fit.model, found.balance.bandwidth)
         except InputError:
-            heldout = None  # too little motion, or no effort: they judge nothing
+            heldout = None  # too little motion, or no effort: they cannot be used for judging
     record = found.balance.record
     if heldout is None:
         return _Rows(record, Blocks.of(record, GAP), None)
@@ -124,9 +127,18 @@ def effort_run(
     promising: float | None = None,
     places: int = 1,
 ) -> EffortResult:
-    """Search for up to `most` effects, weigh and decide; `unseen` is the balance of held-out efforts where the case has no records
-    of them, `promising` as for `search_effort`; the same search is made at so many `places`, and chance has as many
-    candidates. Raises InputError where the records hold too little."""
+    """Search for up to `most` effects, weigh the hypotheses and decide.
+
+    Parameters
+    ----------
+    case, applicability : the case, and whether and how effort scoring applies.
+    most : largest number of effects.
+    unseen : balance of held-out efforts, where the case has no held-out records.
+    promising : as for `search_effort`.
+    places : number of joints at which the same search is made; the number of candidates is multiplied by it.
+
+    Raises InputError where the records hold too little motion.
+    """
     with deadline(case.budget.at(SEARCHED)):
         found = search_effort(
             case.records, case.nominal, case.catalogue, applicability.balance, most, case.tell, case.budget,
@@ -140,7 +152,7 @@ def effort_run(
     left = remainder_of(found.balance, found.chosen)
     of_the_motion = next(curve.quantity for curve in left if curve.joint is None)
     mapped = {of_the_motion: rows.predicted(found.chosen, found.beyond)}
-    if places == 1:  # of several joints the motion of one is not all that its effort depends on
+    if places == 1:  # with several joints the effort depends on more than the joint's own motion
         history = history_of(found.balance, found.chosen, found.blocks)
         mapped[HISTORY] = rows.predicted(found.chosen, history)
     if (beside := left[0].joint) is not None:
@@ -171,7 +183,7 @@ def effort_run(
     )
     selection = select(contest)
     chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
-    if places == 1:  # of several joints an error of one may be another one's
+    if places == 1:  # with several joints the error of one may be caused by another
         lasting = lasting_share(predicted[chosen.elements].error, rows.record, GAP)
         contest = replace(contest, structured_after=lasting)
     least = detectable(predicted[chosen.elements].error, time) / size
@@ -196,17 +208,19 @@ def effort_run(
 def _among_models(
     chosen: Fitted, catalogue: Catalogue, balance: Balance, contest: Contest, selection: Selection
 ) -> Fitted:
-    """The chosen fit, whose standard deviations are robust, with what the choice of the model and small effects that it lacks add to them."""
+    """The chosen fit with robust standard deviations, extended by the choice of the model and by small missing effects."""
     between = covariance_between(chosen.fit.names, selection.chosen, contest.hypotheses)
     fit = chosen.fit
-    std = fit.std.copy()  # of the alignment first, which belongs to no model
+    std = fit.std.copy()  # the alignment comes first and belongs to no model
     std[1:] = np.hypot(std[1:], np.sqrt(np.diag(between)))
     return replace(chosen, fit=replace(fit, std=np.hypot(std, small_effects(balance, chosen, catalogue))))
 
 
 def small_effects(balance: Balance, chosen: Fitted, catalogue: Catalogue) -> Array:
-    """Standard deviations (p,) of the fit's parameters that come from small effects which it lacks: those of the catalogue, and any function
-    of the motion."""
+    """Standard deviations (p,) of the fit's parameters due to small effects that it lacks.
+
+    The effects are those of the catalogue and any function of the motion.
+    """
     fit = chosen.fit
     sizes = scales_at(balance, fit)
     starts = [one for one in starts_of(catalogue, fit.model, sizes, balance) if one.kind == "effects"]

@@ -1,4 +1,4 @@
-"""What the measured motion and the effort tell of sizes: the yardstick for first guesses of elements' parameters."""
+"""Scales of the measured motion and of the effort, for first guesses of elements' parameters."""
 
 from dataclasses import replace
 
@@ -13,14 +13,14 @@ from rhythmid.model import Model
 
 
 def scales_at(balance: Balance, fit: EffortFit) -> Scales:
-    """The same as `scales_of`, and the lines over position that a fit leaves."""
+    """As `scales_of`, with the spectral lines over position that a fit leaves."""
     position, velocity, _ = balance.mechanical.T
     lines = lines_below(position, velocity, fit.residual, balance.bandwidth.effort)
     return replace(scales_of(balance, fit.model), residual_wavelengths=lines)
 
 
 def scales_of(balance: Balance, model: Model) -> Scales:
-    """Sizes in the model's units; of a leg on a moving base, of its motion relative to that."""
+    """Scales in the model's units; for a leg on a moving base, of its motion relative to the base."""
     motions = balance.motions
     position = np.concatenate([motion.leg_position for motion in motions])
     effort = np.concatenate([motion.effort for motion in motions])
@@ -29,7 +29,7 @@ def scales_of(balance: Balance, model: Model) -> Scales:
     inertial = model.mass.value * (2.0 * np.pi * line) ** 2
     spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
     size = max(float(np.std(motion.effort)) for motion in motions)
-    # where no spring sets the scale of force, the effort does: an axis moves slowly and yet against much friction
+    # without a spring the effort sets the scale of force: an axis may move slowly against large friction
     stiffness = spring if spring > NO_SPRING * inertial else max(inertial, size / spread)
     return Scales(
         position=spread,
@@ -42,7 +42,8 @@ def scales_of(balance: Balance, model: Model) -> Scales:
         stiffness=float(stiffness),
         frequency=line,
         duration=max(float(motion.time[-1] - motion.time[0]) for motion in motions),
-        period=1.0 / (2.0 * balance.bandwidth.effort),  # what is faster than the bandwidth is not seen
+        period=1.0
+        / (2.0 * balance.bandwidth.effort),  # faster changes are above the bandwidth and not visible
         peak_effort=float(np.abs(effort).max()),
         rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
         displaced_base=any(motion.driven_by_base for motion in motions),

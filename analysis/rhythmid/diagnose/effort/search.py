@@ -1,7 +1,7 @@
-"""The search for what a model lacks, by the recorded effort: nominal, then the best further effect, and so on.
+"""Forward search for missing effects by the recorded effort: from the nominal model, add the best further effect in turn.
 
-All hypotheses predict the same rows of effort. Kin (one family, or one the other's special case) compete for one place: an
-addition takes the place of its kin instead of standing beside it.
+All hypotheses predict the same rows of effort. Related laws (one family, or one a special case of the other) compete for one
+place: an addition replaces a related law instead of standing beside it.
 """
 
 import math
@@ -52,23 +52,23 @@ from rhythmid.record.record import Record
 from rhythmid.value import Prior
 
 Array = NDArray[np.float64]
-MOST_EFFECTS = 4  # effects that are looked for: a fifth was never real on recordings that were tried
-GAP = 3  # rows between blocks: as far as the filter of effort mixes neighbours (its impulse lasts about 1 / cut-off, 2.5 rows)
+MOST_EFFECTS = 4  # effects that are sought: on the recordings tried, a fifth effect was never real
+GAP = 3  # rows between blocks: the length over which the effort filter mixes neighbours (impulse response about 1 / cut-off, 2.5 rows)
 
 
 @dataclass(frozen=True, eq=False)
 class EffortSearch:
-    """What was found.
+    """The result of the search.
 
     Attributes
     ----------
     balance : rows and motions that all hypotheses share.
-    nominal : the nominal model, its free values fitted.
-    hypotheses : all that were fitted, the nominal among them.
-    ruled_out : what was fitted, too, and explains no motion.
-    reference, beyond : the nominal model, and the chosen one, with curves over the motion beside them.
+    nominal : the nominal model with its free values fitted.
+    hypotheses : all fitted hypotheses, including the nominal one.
+    ruled_out : fitted hypotheses that explain no motion.
+    reference, beyond : the nominal and the chosen model with free curves over the motion.
     chosen : the hypothesis with which the search ended.
-    not_tried : why candidates of the catalogue took no part, by name; and what the budget cut off.
+    not_tried : candidates that were not tried, by name, with the reason; including those that the budget cut off.
     candidates : number of effects that were tried.
     cut_short : whether the budget ended the search.
     """
@@ -99,14 +99,14 @@ def search_effort(
 ) -> EffortSearch:
     """Search for what the model lacks to predict the recorded effort.
 
-    With `promising`, additions whose score test promises a smaller gain of log likelihood are not fitted; where there are many
-    joints most of them lack nothing. Raises InputError where no effort was recorded or too little of motion.
+    With `promising`, an addition is fitted only if its score test predicts at least this gain of log likelihood; with many
+    joints most of them lack nothing. Raises InputError where no effort was recorded or the motion is too small.
     """
     balance = balance or Balance.of(records, model)
     names = balance.estimated(model)
     _, jacobian = linearise(balance, model, names, 0.0)
     priors = priors_of(balance, model, names, jacobian[:, 1:])
-    with without_deadline():  # all else is compared with it
+    with without_deadline():  # the reference for all comparisons
         nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors)
     blocks = Blocks.of(balance.record, GAP)
     reference = reference_of(balance, nominal, blocks)
@@ -136,7 +136,7 @@ def search_effort(
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """The state of a search: all that was fitted so far is in `found`."""
+    """The state of a search; `found` holds all hypotheses fitted so far."""
 
     balance: Balance
     catalogue: Catalogue
@@ -145,19 +145,19 @@ class _Search:
     reference: Mapped  # the nominal model with a free map beside it
     found: list[Fitted]
     promising: float | None = None
-    recorded: Array | None = None  # efforts as they were recorded
+    recorded: Array | None = None  # at their own stamps
     tried: set[str] = field(default_factory=set)
     ruled_out: list[Fitted] = field(default_factory=list)
-    cut: dict[str, str] = field(default_factory=dict)  # what the budget left no time for
+    cut: dict[str, str] = field(default_factory=dict)  # not tried for lack of time
 
     @property
     def set_aside(self) -> tuple[Fitted, ...]:
-        """What was ruled out, one of each structure; none that was fitted in another way and not ruled out."""
+        """Hypotheses that were ruled out, one of each structure, unless another fit of that structure was kept."""
         kept = {tuple(sorted(one.elements)): one for one in self.ruled_out if not self._known(one)}
         return tuple(kept.values())
 
     def cut_off(self, parent: Fitted) -> dict[str, str]:
-        """What is not tried any more once the budget is spent: all candidates, or a further effect beside those of the parent."""
+        """What is not tried after the budget is spent: all candidates, or further effects beside those of the parent."""
         if parent.elements:
             return {f"further effects beside {' and '.join(parent.elements)}": SPENT}
         model = parent.fit.model
@@ -165,7 +165,7 @@ class _Search:
         return {one.name: SPENT for one in starts}
 
     def further(self, parent: Fitted) -> Fitted | None:
-        """The best model with one effect more, or with a kin in the place of one; None where the table rejects that."""
+        """The best model with one more effect, or with a related law in place of one; None where a rule rejects it."""
         model = parent.fit.model
         starts = starts_of(self.catalogue, model, scales_at(self.balance, parent.fit), self.balance)
         screened = screen(self.balance, parent.fit, starts)
@@ -199,7 +199,7 @@ class _Search:
                 PRACTICAL_EFFORT, simpler,
             )  # fmt: skip
 
-        # of forms of one thing the simplest that is not replaced stands for all of them
+        # among related laws the simplest one that no richer law replaces represents them all
         for index in order[1:]:
             plain = claimed[index]
             if special_case(plain, claimed[best]) and not replaces(claim(best, plain, plain)):
@@ -207,8 +207,10 @@ class _Search:
         return None if rejections_of(claim(best, parent.claimed(before))) else new[best]
 
     def _nearer(self, new: Sequence[Fitted]) -> list[Fitted]:
-        """The hypotheses with laws that the best of them contains fitted from its values as well, and the better prediction of the two kept:
-        a simpler law may be in another minimum, as good a fit and a worse prediction."""
+        """Refit simpler laws contained in the best hypothesis from its values, and keep the better prediction of the two.
+
+        A simpler law may have ended in another minimum that fits as well but predicts worse.
+        """
         scores = [
             one.score for one in predict([one.linearised for one in new], self.blocks, self.balance.record)
         ]
@@ -227,7 +229,7 @@ class _Search:
         return found
 
     def _promising(self, shortlist: Sequence[Screened], parent: Fitted) -> list[Screened]:
-        """The additions that are worth a fit; a longer delay is where the alignment has gone further than stamps are rounded."""
+        """The additions that are worth a fit. A longer delay is if the alignment exceeds the uncertainty of the stamps."""
         if self.promising is None:
             return list(shortlist)
         least = self.promising * parent.fit.correlation
@@ -235,8 +237,11 @@ class _Search:
         return [one for one in shortlist if (late if one.start.kind == "delay" else one.gain > least)]
 
     def _bases(self, parent: Fitted, start: Start) -> list[Fitted]:
-        """What an addition is put to: the parent, or where that holds its kin, the parent without them, and with those that say another thing:
-        a machine may have a friction of its own and one that grows with the load."""
+        """Base models for an addition.
+
+        The parent, or where it holds related laws: the parent without them, and the parent that keeps those of them that do not
+        contain the addition. A machine may have both a constant friction and one that grows with the load.
+        """
         if start.element is None:
             return [] if start.name in parent.elements else [parent]
         model = parent.fit.model
@@ -250,11 +255,11 @@ class _Search:
         return [base] if beside.elements == base.elements else [base, beside]
 
     def without(self, fitted: Fitted, label: str) -> Fitted:
-        """The hypothesis less one of its additions, fitted again; one that was fitted before is taken as it is."""
+        """The hypothesis without one of its additions, refitted; an existing fit of that structure is reused."""
         model = fitted.fit.model
         if model.term(label) is not None:
             model = model.pruned(label)
-        elif label in model.parameters:  # a freed value is fixed again
+        elif label in model.parameters:  # a freed value becomes fixed again
             model = model.with_parameters({label: self.nominal.fit.model.parameters[label]})
         gone = {term.label for term in fitted.fit.model.terms} - {term.label for term in model.terms}
         rest = tuple(one for one in fitted.elements if one != label and one not in gone)
@@ -268,15 +273,17 @@ class _Search:
         }
         made = self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
         shape = dict(made.shape)
-        for one in rest:  # beside fewer effects it may do what it did not before
+        for one in rest:  # with fewer effects its shape statistics may change
             term = made.fit.model.term(one)
             if term is not None:
                 shape = _worst(shape, self._shape(made, self.without(made, one), one, term.element))
         return replace(made, shape=shape)
 
     def reduce(self, fitted: Fitted) -> None:
-        """Fit a hypothesis of several effects without each of them, and with each law that one of them contains in its place: beside
-        what was found later the simpler law may do."""
+        """Backward elimination: fit a hypothesis without each of its effects, and with simpler laws in their place.
+
+        Beside effects that were found later the simpler law may suffice.
+        """
         for label in fitted.elements if len(fitted.elements) > 1 else ():
             if time_is_up():
                 self.cut["backward elimination"] = SPENT
@@ -292,7 +299,7 @@ class _Search:
             (self.found if keeps_shape(fitted.shape) else self.ruled_out).append(fitted)
 
     def _simplify(self, base: Fitted, element: Element) -> None:
-        """Fit the base with each law that the element contains."""
+        """Fit the base with each simpler law that the element contains."""
         model = base.fit.model
         simpler = [
             start
@@ -305,7 +312,7 @@ class _Search:
                 self._keep(made)
 
     def fitted(self, base: Fitted, one: Screened) -> Fitted | None:
-        """The base with an addition, everything refitted from its first guess."""
+        """The base with an addition, all parameters refitted from its first guess."""
         start, balance = one.start, self.balance
         alignment, aligned = base.fit.alignment, self._aligned(base.elements)
         model, label = extended(base.fit.model, start, one.factor)
@@ -324,7 +331,7 @@ class _Search:
         return replace(made, shape=_worst(base.shape, made.shape, own))
 
     def _shape(self, made: Fitted, base: Fitted, label: str, element: Element) -> dict[str, float]:
-        """Statistics of an effect, by the rule that looks at them; `base` is the hypothesis without it."""
+        """Statistics of an effect by the name of the rule that uses them; `base` is the hypothesis without it."""
         model, sizes = made.fit.model, scales_of(self.balance, base.fit.model)
         own = beyond_motion(self.balance, model, label, self.nominal.linearised, self.reference.linearised)
         shape = {"more_than_motion": own}
@@ -337,7 +344,7 @@ class _Search:
         return shape
 
     def _left(self, made: Fitted, base: Fitted, label: str) -> float:
-        """Share of the effort that an actuator's effect leaves to move the machine."""
+        """Share of the effort that remains for moving the machine beside an actuator's effect."""
         left, before = (
             float(np.linalg.norm(self.balance.predicted(model, 0.0)))
             for model in (made.fit.model.pruned(label), base.fit.model)
@@ -345,7 +352,7 @@ class _Search:
         return left / before if before > 0.0 else math.inf
 
     def _priors(self, model: Model, label: str, element: Element, alignment: float) -> dict[str, Prior]:
-        """An addition's effect is below the effort; its shape may be anything that changes it by no more than that."""
+        """Priors of an addition: a change of any of its parameters may change the effort by at most the effort's size."""
         names = [name for name in model.free if name.startswith(f"{label}.")]
         _, columns = linearise(self.balance, model, names, alignment)
         found: dict[str, Prior] = {}
@@ -380,12 +387,12 @@ class _Search:
 
 
 def _worst(*shapes: Mapping[str, float]) -> dict[str, float]:
-    """The least of each statistic."""
+    """The smallest value of each statistic."""
     return {name: min(one[name] for one in shapes if name in one) for name in set().union(*shapes)}
 
 
 def _kind_of(elements: Sequence[str], model: Model) -> Kind:
-    """What is supposed where the nominal model is given these elements."""
+    """The kind of hypothesis that these additions to the nominal model make."""
     if not elements:
         return "nominal"
     if INPUT_DELAY in elements:

@@ -1,7 +1,7 @@
-"""Names that the records of a joint do not separate: effects, values of the body, delays.
+"""Names that the records of a joint cannot separate: effects, values of the body, delays.
 
-The search lists effects that predict as well as the chosen one. A value of the body may do so, too: a link that turns about one fixed axis is felt
-as the rotor is, exactly, so that no search tries both.
+The search lists effects that predict as well as the chosen one. A value of the body may do so, too. The inertia of a link that
+turns about one fixed axis is exactly equivalent to that of the rotor, so that no search tries both.
 """
 
 from rhythmid.body.body import BODY
@@ -12,7 +12,7 @@ from rhythmid.simulation.transport import INPUT_DELAY
 
 
 def equivalents(one: JointResult) -> tuple[tuple[str, ...], ...]:
-    """Groups of names at a joint that predict as well as one another, the chosen one first; a value of the body goes by its label."""
+    """Groups of equivalent names at a joint, the chosen one first; a value of the body is given by its label."""
     contest, chosen = one.result.contest, one.result.selection.chosen
     groups = {group[0]: list(group) for group in one.result.decision.equivalent}
     for label, name in zip(chosen.elements, chosen.names, strict=True):
@@ -31,7 +31,7 @@ def equivalents(one: JointResult) -> tuple[tuple[str, ...], ...]:
 
 
 def equivalent_names(one: JointResult) -> tuple[tuple[str, ...], ...]:
-    """The groups as an answer has them: a value of the body goes by what is wrong with it, such as `link_mass`."""
+    """The groups in the form of an answer: a value of the body is given as the quantity that is wrong, such as `link_mass`."""
     named = (
         tuple(dict.fromkeys(name_of(one.joint, name, one.by_reference)[0] for name in group))
         for group in equivalents(one)
@@ -40,7 +40,7 @@ def equivalent_names(one: JointResult) -> tuple[tuple[str, ...], ...]:
 
 
 def shared_among(one: JointResult, label: str) -> int:
-    """Among how many names the probability of one is to be shared that no search has tried against one another."""
+    """Number of equivalent names, untested against one another, among which the probability of one name is shared."""
     return 1 + len(one.rotors) if label == INERTIA else 1
 
 

@@ -1,4 +1,4 @@
-"""What a diagnosis of a machine of several joints says: the contract of one axis, with the joint of every missing effect."""
+"""The answer for a machine of several joints: the contract of one axis, with the joint of every missing effect."""
 
 import json
 from dataclasses import dataclass, field
@@ -14,10 +14,11 @@ from rhythmid.identify.joints.reference_delay import ReferenceDelay
 
 @dataclass(frozen=True)
 class JointEffect:
-    """An effect that the nominal model lacks at a joint; of a link's mass, inertia or payload, `link` says which, and the joint is the one that moves it.
+    """An effect that the nominal model lacks at a joint.
 
-    `share` is that of the joint's mismatch. `heldout_gain` is by how much the error at the joint falls on data that no fit has seen,
-    as a share of the effort.
+    For a link's mass, inertia or payload, `link` names the link, and the joint is the one that moves it. `share` is relative to
+    the joint's mismatch. `heldout_gain` is the reduction of the joint's error on data that no fit has seen, as a share of the
+    effort.
     """
 
     joint: str
@@ -32,14 +33,14 @@ class JointEffect:
 
     @property
     def of_link(self) -> str:
-        """What is wrong with a link, in words; nothing where the effect acts at the joint."""
+        """The wrong quantity of a link in words; empty where the effect acts at the joint."""
         kind = self.element.removeprefix("link_")
         return f"{kind} of {self.link}" if self.link else ""
 
 
 @dataclass(frozen=True)
 class JointLocation:
-    """Which joint, and which slot of its path, is deficient, in one sentence."""
+    """The deficient joint and the slot of its path, in one sentence."""
 
     joint: str | None
     slot: str | None
@@ -50,10 +51,10 @@ class JointLocation:
 class MachineDiagnosis:
     """The answer to: which physics does the model of this machine lack, and at which joint?
 
-    `joints` holds the whole answer at each joint, `unknown` the joints whose mismatch no name of the catalogue explains, `undecided`
-    those at which the evidence does not separate several names, `not_judged` why a joint could not be judged. `families` are by joint the
-    kinds of what is missing, which may be certain where the law is not. `reference_delay` is by how much later than the model says the
-    references act, where efforts are made from them.
+    `joints` holds the complete answer of each joint. `unknown` are joints whose mismatch no name of the catalogue explains;
+    `undecided` are those at which the evidence does not separate several names; `not_judged` gives the reasons for joints that
+    could not be judged. `families` are the kinds of missing physics by joint, which may be certain where the law is not.
+    `reference_delay` is the additional delay, beyond the model's, with which references act, where efforts are computed from them.
     """
 
     verdict: Verdict

@@ -1,4 +1,4 @@
-"""What a diagnosis of several joints is asked, and each joint of it as a case of one axis."""
+"""The input of a diagnosis of several joints, and each joint as a case of one axis."""
 
 import math
 from dataclasses import dataclass, replace
@@ -20,24 +20,27 @@ from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.simulation.transport import INPUT_DELAY
 
-# gain of log likelihood that a score test has to promise for an addition to be fitted: 1 in 70 reaches it by chance (chi-square), and
-# what is named has to gain more than twice as much
+# gain of log likelihood that a score test has to predict for an addition to be fitted: 1 in 70 reaches it by chance (chi-square),
+# and a named effect has to gain more than twice as much
 PROMISING = 3.0
-STIFFNESS = 0.1  # of the effort for the motion's size, that a spring is tried at
-# how an answer names what is wrong with a link
+STIFFNESS = 0.1  # first guess of a spring: share of the effort at the size of the motion
+# the name in an answer for a wrong quantity of a link
 OF_LINKS = {MASS: "link_mass", TURNING: "link_inertia", PAYLOAD: "payload"}
-GAINS = (0.9, 1.1)  # at which it is tried whether an actuator gives less or more than is asked of it
-# standard deviations of a joint's speed at which a limit of its reference's rate is tried: a reference that the limit keeps back most of the time
-# moves at that rate, so that the joint does
+GAINS = (0.9, 1.1)  # first guesses of an actuator's gain
+# first guesses of a limit of the reference's rate, in standard deviations of the joint's speed: if the limit acts most of the time,
+# the reference and the joint move at that rate
 RATES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
-# [Hz] at which a drive may take a new reference: round ones, below those of records, which show no faster one
+# [Hz] usual rates at which a drive may take a new reference; faster ones do not show at the rates of records
 CLOCKS = (125.0, 100.0, 80.0, 60.0, 50.0, 40.0, 30.0, 25.0, 20.0, 10.0)
 
 
 @dataclass(frozen=True, eq=False)
 class JointResult:
-    """What was found at one joint; `late` [s] by how much later a reference acts where the effort was made from it, `rotors` the links' masses and
-    inertias that the joint feels as it does its rotor's."""
+    """The result at one joint.
+
+    `late` [s] is the additional delay of a reference where the effort was computed from it. `rotors` are the links' masses
+    and inertias that act at the joint exactly like the inertia of its rotor.
+    """
 
     joint: str
     case: Case
@@ -47,13 +50,15 @@ class JointResult:
 
     @property
     def by_reference(self) -> bool:
-        """Whether the joint's effort is what its controller makes of its reference."""
+        """Whether the joint's effort is computed by its controller from its reference."""
         return self.result.search.balance.by_reference
 
 
 def joint_catalogue(catalogue: Catalogue) -> Catalogue:
-    """The catalogue for a joint, whose inertia and weight are known from the body: there an actuator's gain is no mere calibration,
-    and a spring may be at rest anywhere."""
+    """The catalogue for a joint whose inertia and weight are known from the body.
+
+    There an actuator's gain is not just calibration, and a spring may have any rest position.
+    """
     found = dict(catalogue.elements)
     if (gain := found.get("actuator_gain")) is not None:
         found[gain.name] = replace(gain, candidate=True, starts=lambda _: [{"gain": one} for one in GAINS])
@@ -71,10 +76,12 @@ def joint_catalogue(catalogue: Catalogue) -> Catalogue:
         found[hold.name] = replace(
             hold, starts=lambda s: [{"period": 1.0 / rate} for rate in CLOCKS if 4.0 * s.frequency < rate]
         )
-    # what the joints of a simulated robot have
+    # the friction model of simulated robots
     if (friction := found.get("soft_constraint_friction")) is not None:
         found[friction.name] = replace(friction, candidate=True)
-    if (constant := found.get("constant_force")) is not None:  # a spring that is at rest far from the motion
+    if (
+        constant := found.get("constant_force")
+    ) is not None:  # a spring at rest far from the motion acts like a constant force
         found[constant.name] = replace(constant, special_case_of=(*constant.special_case_of, "linear_spring"))
     return Catalogue(found)
 
@@ -84,7 +91,10 @@ def diagnose_joint(
     balances: JointBalances, unseen: JointBalances | None, joint: str, catalogue: Catalogue, tell: Tell,
     budget: Budget, late: float = 0.0,
 ) -> JointResult:  # fmt: skip
-    """Search for what one joint's path lacks; a reference acts there `late` [s] after its stamp. Raises InputError where the records hold too little of its motion."""
+    """Search for what one joint's path lacks; a reference acts `late` [s] after its stamp.
+
+    Raises InputError where the records hold too little motion of the joint.
+    """
     model = balances.models[joint]
     balance = balances.balance(joint, late)
     other: Balance | None = None
@@ -92,7 +102,7 @@ def diagnose_joint(
         try:
             other = unseen.balance(joint, late)
         except InputError:
-            other = None  # too little motion: it judges nothing
+            other = None  # too little motion: it cannot be used for judging
     case = Case(model, (), (), joint_catalogue(catalogue), None, tell, budget)
     found = effort_run(
         case, _applicable(balance, model), MOST_EFFECTS, other, PROMISING, len(balances.models)
@@ -110,8 +120,11 @@ def _applicable(balance: Balance, model: Model) -> Applicability:
 
 
 def name_of(joint: str, label: str, by_reference: bool = False) -> tuple[str, str]:
-    """What was found wrong at a joint, and where, of a label that is no element's: a link's mass, its inertia, its payload, the rotor's
-    inertia, a delay: of the actuator, or where the effort is made `by_reference` of that."""
+    """Name and place of a wrong quantity of a joint whose label is not that of an element.
+
+    It is a link's mass, inertia or payload, the rotor's inertia, or a delay: of the actuator, or where the effort is computed
+    `by_reference`, of the reference.
+    """
     if label == INERTIA:
         return "armature", joint
     if label.startswith(f"{BODY}."):

@@ -1,4 +1,4 @@
-"""The answers of all joints put together."""
+"""Compose the answers of all joints."""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,7 +18,7 @@ from rhythmid.model import INERTIA
 from rhythmid.report.quantity import in_words
 from rhythmid.simulation.transport import INPUT_DELAY
 
-EQUATIONS = {  # of what is no element: its slot, what it says, and the name of its one parameter
+EQUATIONS = {  # for quantities that are not elements: slot, meaning, and the name of the one parameter
     "armature": ("body", "M_jj → M_jj + ΔI", "inertia_error"),
     "link_mass": ("body", "m → m′, shape kept", "mass"),
     "link_inertia": ("body", "J → J′ about the centre of mass, along the joint's axis", "inertia"),
@@ -42,7 +42,7 @@ def compose_machine(
     notes: Sequence[str] = (),
     delay: ReferenceDelay | None = None,
 ) -> MachineDiagnosis:
-    """The diagnosis; `links` are those whose masses, inertias or payloads were put right, `stated` the labels by which the answer at each joint stands."""
+    """The diagnosis; `links` are the corrected masses, inertias or payloads, `stated` the labels stated at each joint."""
     missing = [
         _effect(found[joint], answers[joint], label)
         for joint, labels in stated.items()
@@ -126,7 +126,7 @@ def _value(one: JointResult, answer: Diagnosis, label: str) -> Estimate:
 
 
 def _gain(one: JointResult) -> float:
-    """Fall of the error on data that no fit has seen, as a share of the joint's effort."""
+    """Reduction of the error on data that no fit has seen, as a share of the joint's effort."""
     size = size_of(one.result.search.balance)
     before, after = (
         one.result.errors[tuple(sorted(f.elements))] for f in (one.result.nominal, one.result.chosen)
@@ -135,7 +135,7 @@ def _gain(one: JointResult) -> float:
 
 
 def _link(machine: Machine, wrong: WrongLink) -> JointEffect:
-    """A link's mass, inertia or payload, with the evidence of the joint that showed it best."""
+    """A link's mass, inertia or payload, with the evidence of the joint that shows it best."""
     one, label = wrong.shown, f"{BODY}.{wrong.parameter}"
     decision = one.result.decision
     element, name = name_of(one.joint, label)
@@ -152,8 +152,10 @@ def summary_of_joints(
     undecided: Sequence[str],
     answers: Mapping[str, Diagnosis],
 ) -> str:
-    """The joints at which something is wrong; of those with unknown physics what that depends on, and of those at which the records do not
-    decide what each could lack."""
+    """Summary of the joints at which something is wrong.
+
+    For joints with unknown physics it names the quantity that the mismatch depends on; for undecided joints, the candidates.
+    """
     said = []
     for one in missing:
         what = f"the {one.of_link}" if one.link else in_words(one.element)
@@ -168,13 +170,13 @@ def summary_of_joints(
 
 
 def _in_its_place(one: JointEffect, answer: Diagnosis) -> list[str]:
-    """In words the effects that explain a joint as well as this one does."""
+    """Effects that explain a joint as well as this one does, in words."""
     groups = [group for group in answer.indistinguishable if one.element in group]
     return [in_words(name) for group in groups for name in group if name != one.element]
 
 
 def _alike(joints: Sequence[str], answers: Mapping[str, Diagnosis]) -> dict[str, list[str]]:
-    """What is said at these joints, each of which has an answer of its own, and the joints at which the same is said."""
+    """Joints grouped by the summary of their answers; each joint has an answer of its own."""
     found: dict[str, list[str]] = {}
     for joint in joints:
         found.setdefault(answers[joint].summary, []).append(joint)
@@ -198,7 +200,7 @@ def _location(
 def _next(
     answers: Mapping[str, Diagnosis], named: set[str], unknown: Sequence[str], undecided: Sequence[str]
 ) -> str:
-    """What to record next, for the joint that needs it most."""
+    """The next experiment, for the joint that needs it most."""
     for joint in (*undecided, *unknown, *(j for j in answers if j in named)):
         if not answers[joint].settled:
             return f"joint {joint}: {answers[joint].next_experiment}"

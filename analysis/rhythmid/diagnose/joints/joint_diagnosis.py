@@ -1,8 +1,8 @@
 """Diagnose a machine of several joints: at joint J, in slot S, element E.
 
-Every joint is searched as the one of a machine of one axis, beside what the rest of the body asks of it, and chance has the candidates of
-all joints. A link whose mass or inertia is wrong, or that carries a payload, shows at every joint that carries it: where one is found, it is put right, and the joints that feel
-it are searched again.
+Every joint is searched like the joint of a one-axis machine, with the forces of the rest of the body included. The false-alarm
+rate accounts for the candidates of all joints. A link with a wrong mass or inertia, or with a payload, shows at every joint that
+carries it. If one is found, it is corrected, and the joints that feel it are searched again.
 """
 
 import math
@@ -42,17 +42,17 @@ from rhythmid.simulation.transport import INPUT_DELAY
 if TYPE_CHECKING:
     from rich.console import Console
 
-# masses, inertias and payloads of links that are put right, at most, or as many as there are links
+# masses, inertias and payloads of links that are corrected, at most, or the number of links if that is larger
 MOST_LINKS = 2
-# of the mass that the file gives a link, below which another effect has swallowed it. A file's inertia may be that about the joint, of which
-# the one about the centre of mass is any share
+# share of the given mass of a link, below which another effect has absorbed it. An inertia in a file may be that about the joint,
+# of which the inertia about the centre of mass may be any share
 LIGHTEST = 0.1
-MATTERS = 0.02  # of a mass or an inertia, below which it is as right as a balance tells
+MATTERS = 0.02  # smallest change of a mass or an inertia that an effort balance resolves, as a share of it
 
 
 @dataclass(frozen=True)
 class MachineAnswer(Result):
-    """A diagnosis, the augmented machine, and what was found at each joint."""
+    """A diagnosis, the augmented machine, and the result at each joint."""
 
     diagnosis: MachineDiagnosis
     machine: Machine
@@ -73,7 +73,7 @@ class MachineAnswer(Result):
         return self.diagnosis.to_dict()
 
     def tables(self) -> Mapping[str, Sequence[Row]]:
-        """The `joints` with their verdicts and errors, and what is `missing`."""
+        """The `joints` with their verdicts and errors, and the `missing` effects."""
         joints = [
             {"joint": joint, "verdict": one.verdict}
             | {name: one.fit[name].heldout_nrmse for name in ("refitted_nominal", "augmented")}
@@ -96,7 +96,7 @@ def diagnose_machine(
 ) -> MachineAnswer:
     """Find the physics that the model of a machine lacks to explain records; arguments as for `diagnose`.
 
-    Raises InputError for records that cannot be judged: a joint or a floating base that was not recorded, too little of motion.
+    Raises InputError for records that cannot be judged: a joint or a floating base was not recorded, or too little motion.
     """
     if not records:
         raise InputError("no record is given; name at least one bag or table")
@@ -112,7 +112,7 @@ def diagnose_machine(
         best = tried if best is None or tried.causes < best.causes else best
         if best.causes <= 1 or spent.spent:
             break
-    assert best is not None  # there is one reading at least
+    assert best is not None  # there is at least one reading
     if not best.found:
         raise InputError(f"no joint can be judged: {next(iter(best.refused.values()))}")
     answers = {joint: _answer(one) for joint, one in best.found.items()}
@@ -128,8 +128,10 @@ def diagnose_machine(
 
 @dataclass(frozen=True, eq=False)
 class _Explained:
-    """What was found at the joints: the machine with the links' parameters that are put right, and the `leads` [s] and
-    the `delay` of references that were allowed for."""
+    """The results of all joints.
+
+    `machine` has the corrected parameters of links; the `leads` [s] and the `delay` of references were taken into account.
+    """
 
     machine: Machine
     found: Mapping[str, JointResult]
@@ -140,12 +142,12 @@ class _Explained:
 
     @property
     def stated(self) -> dict[str, tuple[str, ...]]:
-        """Labels by which the answer stands, by joint."""
+        """Labels that the answer states, by joint."""
         return {joint: stated_at(one) for joint, one in self.found.items()}
 
     @property
     def causes(self) -> int:
-        """How many causes it takes to explain the records: what is stated, and joints that are not consistent though nothing is."""
+        """Number of causes that explain the records: stated ones, and inconsistent joints at which none is stated."""
         stated = self.stated
         open_ = [
             joint
@@ -159,7 +161,7 @@ def _explained(
     machine: Machine, balances: JointBalances, records: Sequence[JointRecord], holdout: Sequence[JointRecord],
     catalogue: Catalogue, tell: Tell, budget: Budget,
 ) -> _Explained:  # fmt: skip
-    """Search every joint, put a link's mass or inertia right where one is found, and search again what feels it."""
+    """Search every joint, correct a link's mass or inertia where one is found, and search the joints that feel it again."""
     links: dict[str, WrongLink] = {}
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
     delay = reference_delay(balances, balances.computed) if balances.computed else None
@@ -199,7 +201,7 @@ def _searched(
 
 
 def stated_at(one: JointResult) -> tuple[str, ...]:
-    """Labels by which the answer at a joint stands: elements, or a value of the body that is wrong, or a delay."""
+    """Labels that the answer at a joint states: elements, a wrong value of the body, or a delay."""
     decision, chosen = one.result.decision, one.result.selection.chosen
     own = _own_labels(one)
     if decision.verdict == "missing_physics":
@@ -212,27 +214,29 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
     if chosen.kind not in ("freed_value", "delay") or not (alike or decision.joint >= STATED):
         return ()
     known = all(label == INERTIA or name_of(one.joint, label)[0] != label for label in own)
-    if not known:  # another value of the path is its author's to check
+    if not known:  # a wrong value of the path itself is left to the model's author
         return ()
     named = tuple(label for label in decision.named if _differs(one, label))
     return named if alike else tuple(label for label in named if decision.probability[label] >= STATED)
 
 
 def _own_labels(one: JointResult) -> list[str]:
-    """Values of the body, the path or its delay among what was chosen at a joint."""
+    """The chosen labels at a joint that are not elements: values of the body or of the path, or a delay."""
     chosen = one.result.selection.chosen
     return [label for label in chosen.elements if one.result.chosen.fit.model.term(label) is None]
 
 
 def _different(one: JointResult) -> bool:
-    """Whether anything was chosen at a joint but values that have come out as they were, or nothing explains it."""
+    """Whether anything other than unchanged values was chosen at a joint, or nothing was chosen at all."""
     own, chosen = _own_labels(one), one.result.selection.chosen
     return len(own) < max(len(chosen.elements), 1) or any(_differs(one, label) for label in own)
 
 
 def _held_by_alike(one: JointResult) -> float:
-    """Share of the evidence for one effect alone that is the chosen one or predicts as well as it does: where it is large the joint is
-    certain although the name is not, and the answer lists the others as indistinguishable."""
+    """Share of the evidence held by the chosen effect and by single effects that predict as well.
+
+    Where it is large, the joint is certain although the name is not; the answer lists the others as indistinguishable.
+    """
     decision, chosen = one.result.decision, one.result.selection.chosen
     if len(chosen.elements) != 1:
         return 0.0
@@ -242,20 +246,20 @@ def _held_by_alike(one: JointResult) -> float:
 
 
 def _differs(one: JointResult, label: str) -> bool:
-    """Whether a value of the body has come out other than it was; a payload is measured by the mass of its link."""
+    """Whether a value of the body differs from the given one; a payload is compared with the mass of its link."""
     if label == INPUT_DELAY or label not in one.case.nominal.parameters:
         return True
     before, after = one.case.nominal.value(label), one.result.chosen.model.value(label)
     owner, kind = split(label)
     if after <= 0.0 if kind == TURNING else after < LIGHTEST * before:
-        return False  # what takes a link's mass or its whole inertia away is something else
+        return False  # an effect that removes a link's mass or its whole inertia is another one
     known = one.case.nominal.parameters
     whole = known[f"{owner}.{MASS}"].value if kind == PAYLOAD and f"{owner}.{MASS}" in known else before
     return abs(after - before) > MATTERS * abs(whole)
 
 
 def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, JointResult] | None:
-    """The link's parameter that is wrong by the strongest evidence, and the joint that says so."""
+    """The wrong parameter of a link with the strongest evidence, and the result of the joint that shows it."""
     best: tuple[float, str, JointResult] | None = None
     for one in found.values():
         for label in stated_at(one):
@@ -274,7 +278,7 @@ def _answer(one: JointResult) -> Diagnosis:
 
 
 def _augmented(best: _Explained) -> Machine:
-    """The machine with what was fitted, and with what the answer stands by; masses that were put right stay as the answer says."""
+    """The machine with the fitted paths and the stated effects; corrected masses keep the values of the answer."""
     machine, stated = best.machine, best.stated
     inertial: dict[str, float] = {}
     spreads: dict[str, float] = {}
@@ -284,12 +288,17 @@ def _augmented(best: _Explained) -> Machine:
         adopted = {
             *stated[joint],
             *one.result.nominal.fit.names,
-        }  # not a value that was set free and is not stated
+        }  # without values that were freed but are not stated
         if INERTIA in adopted:
             rotor = fitted.model.mass.value - path.mass.value
             before = machine.body.parameters[f"{joint}.armature"]
             inertial[f"{joint}.armature"] = max(before + rotor, 0.0)
-        for label, std in fitted.std().items():  # a free mass is as the joint says that tells it best
+        for (
+            label,
+            std,
+        ) in (
+            fitted.std().items()
+        ):  # a free mass takes the value of the joint with the smallest standard deviation
             link = label.removeprefix(f"{BODY}.")
             free = label.startswith(f"{BODY}.") and label in adopted and link not in best.links
             if free and std < spreads.get(link, math.inf):
@@ -299,7 +308,7 @@ def _augmented(best: _Explained) -> Machine:
 
 
 def _with_delay(one: JointResult, fitted: Fitted) -> Model:
-    """A joint's fitted path with the whole delay of its reference, where the effort was made from that and the path has a delay."""
+    """A joint's fitted path; if it has a delay and the effort was computed from the reference, with the reference's whole delay."""
     model = fitted.model
     if not one.by_reference or INPUT_DELAY not in model.parameters or model.parameters[INPUT_DELAY].fixed:
         return model
@@ -308,9 +317,9 @@ def _with_delay(one: JointResult, fitted: Fitted) -> Model:
 
 
 def _without_body(model: Model, path: Model) -> Model:
-    """A joint's fitted path with the inertia that it borrows, without the term for the body."""
+    """A joint's fitted path without the term for the body and with its own inertia."""
     kept = tuple(term for term in model.terms if term.label != BODY)
     behind = tuple(
         t for t in path.terms if t.label not in {term.label for term in kept}
-    )  # behind the measured effort
+    )  # elements behind the measured effort
     return replace(model, mass=path.mass, terms=(*kept, *behind))

@@ -1,4 +1,4 @@
-"""A diagnosis of several joints as a report."""
+"""Report of a diagnosis of several joints."""
 
 from collections.abc import Mapping
 
@@ -16,7 +16,7 @@ from rhythmid.report.robot_figure import DrawnJoint
 
 
 def present_machine(answer: MachineAnswer, nominal: Machine, source: str, command: str) -> Page:
-    """The page of an answer; `source` names model and records, `command` the command line."""
+    """The page of an answer; `source` names the model and the records, `command` is the command line."""
     result = answer.diagnosis.to_dict()
     models = {"Nominal machine": nominal.to_yaml(), "Augmented machine": answer.machine.to_yaml()}
     return joints_page(result, source, _robot(answer, nominal.body), _curves(answer.results, nominal), command, models)  # fmt: skip
@@ -46,7 +46,7 @@ def _curves(results: Mapping[str, JointResult], machine: Machine) -> dict[str, J
     found = {}
     for joint, one in results.items():
         balance = one.result.search.balance
-        first = len(balance.places[0])  # the rows of the first motion
+        first = len(balance.places[0])  # number of rows of the first motion
         time = balance.motions[0].time[np.asarray(balance.places[0], dtype=int)]
         measured = balance.measured[:first]
         nominal, augmented = (fit.fit.residual[:first] for fit in (one.result.nominal, one.result.chosen))

@@ -1,4 +1,4 @@
-"""Joints whose efforts the body of the file hardly fits, whatever else is named there."""
+"""Joints whose efforts the body's file hardly fits, whatever effects are named there."""
 
 from collections.abc import Iterator, Mapping
 
@@ -7,8 +7,11 @@ from rhythmid.diagnose.constants import BLIND, HOPELESS
 
 
 def misfits(answers: Mapping[str, Diagnosis]) -> Iterator[str]:
-    """What to check, in one sentence for each joint at which the refitted nominal model predicts the effort hardly better than nothing does,
-    and the named effects leave more of it than an identified model does."""
+    """One sentence on what to check for each joint with a poor fit.
+
+    There the refitted nominal model hardly predicts the effort better than no model does, and the named effects leave more of
+    the effort than an identified model leaves.
+    """
     for joint, answer in answers.items():
         nominal, named = _error(answer.fit["refitted_nominal"]), _error(answer.fit["augmented"])
         if nominal < HOPELESS or named < BLIND:
@@ -21,5 +24,5 @@ def misfits(answers: Mapping[str, Diagnosis]) -> Iterator[str]:
 
 
 def _error(quality: FitQuality) -> float:
-    """Error of the effort as a share of it, on held-out data where there are any."""
+    """Relative error of the effort, on held-out data if there are any."""
     return quality.train_nrmse if quality.heldout_nrmse is None else quality.heldout_nrmse

@@ -1,8 +1,8 @@
-"""Where a payload sits: its place in the frame of its link, and its mass, from the efforts of all joints that feel it.
+"""Place of a payload in the frame of its link, and its mass, from the efforts of all joints that feel it.
 
-The search takes a payload to be a point mass at the end of its link. A gripper's or a foot's centre is near it and not at it, and what that
-leaves would be taken for a wrong mass or rotor. The force of a point mass is linear in its mass, its first moment and its inertia (M. Gautier,
-W. Khalil, Int. J. Robot. Res. 11 (1992) 362), so that mass and place follow from the columns of these.
+The search assumes a point mass at the end of the link. The centre of a gripper or a foot is close to this point but not at it; the
+remaining mismatch would be attributed to a wrong mass or rotor. The force of a point mass is linear in its mass, its first moment and
+its inertia (M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362). Mass and place therefore follow from the columns of these.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ from rhythmid.record.joint_record import JointRecord
 
 Array = NDArray[np.float64]
 BESIDE = 0.1  # [m] standard deviation of a payload's place about the end of its link: the size of a gripper or of a foot
-ROUNDS = 3  # of fits of the paths and of the payload in turn; the payload settles in two
+ROUNDS = 3  # alternating fits of the paths and of the payload; the payload converges in two
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class PlacedPayload:
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """What one joint says: its residual (n,), the columns (n, 10) of the link's inertia, and those (n, p) of what else is fitted there."""
+    """The data of one joint: residual (n,), columns (n, 10) of the link's inertia, columns (n, p) of the other parameters."""
 
     residual: Array
     columns: Array
@@ -57,7 +57,7 @@ def placed_payload(
 ) -> PlacedPayload:
     """Mass and place of the payload of a link; `shown_at` is the joint whose search found it.
 
-    The path of that joint is the one that was chosen there, those of the others are the given ones; all are fitted again beside the payload.
+    That joint keeps its chosen path, the others their given ones; all paths are refitted together with the payload.
     """
     machine, parameter = balances.machine, f"{link}.{PAYLOAD}"
     end, chosen = machine.body.ends[link], found[shown_at].result.chosen.model
@@ -77,7 +77,7 @@ def placed_payload(
 
 
 def _refined(rows: Sequence[_Rows], value: Array, end: Array) -> tuple[Array, Array]:
-    """Mass and place (4,) that fit better than these values do, and their standard deviations."""
+    """Improved mass and place (4,) from a start `value`, and their standard deviations."""
     weighted = [_weighted(one) for one in rows]
     before = value[0] * point_mass(value[1:])
 
@@ -103,7 +103,7 @@ def _rows(balances: JointBalances, joint: str, model: Model, late: float, link: 
 
 
 def _weighted(one: _Rows) -> tuple[Array, Array]:
-    """Residual and columns of a joint in units of its noise, without what the other parameters of the joint explain."""
+    """Residual and columns of a joint in units of its noise, with the joint's other parameters projected out."""
     scale = scale_of(one.residual)
     lasts = autocorrelation_time(one.residual, one.record)
     root = np.sqrt(weights_of(one.residual, scale) / lasts) / scale

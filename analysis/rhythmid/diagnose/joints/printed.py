@@ -1,4 +1,4 @@
-"""A diagnosis of several joints as text on a terminal."""
+"""Print a diagnosis of several joints."""
 
 from rich.console import Console
 from rich.markup import escape
@@ -44,7 +44,7 @@ def show_diagnosis(found: MachineDiagnosis, console: Console) -> None:
 
 
 def left_words(one: Diagnosis) -> str:
-    """What a joint's answer leaves of its mismatch, in words; a dash where there is no mismatch."""
+    """The unexplained share of a joint's mismatch, in words; a dash where there is no mismatch."""
     if one.verdict == "consistent":
         return NONE
     if not one.remainder.significant:

@@ -1,4 +1,4 @@
-"""A link whose mass or inertia is wrong or that carries a payload, and the machine with that put right."""
+"""A link with a wrong mass or inertia or with a payload, and the machine with the corrected value."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,9 +20,12 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True, eq=False)
 class WrongLink:
-    """What is wrong with a link: the body's `parameter`, as "link.mass", "link.inertia" or "link.payload", its `values` ("mass" [kg], or "inertia" [kg*m^2]
-    about the centre of mass along the axis of the link's joint; of a payload its place
-    "x", "y", "z" [m] in the link's frame as well), and the joint that has `shown` it best."""
+    """The wrong quantity of a link.
+
+    `parameter` is the body's, as "link.mass", "link.inertia" or "link.payload". `values` are "mass" [kg], or "inertia" [kg*m^2]
+    about the centre of mass along the axis of the link's joint; for a payload also its place "x", "y", "z" [m] in the link's
+    frame. `shown` is the joint that shows it best.
+    """
 
     parameter: str
     values: Mapping[str, Estimate]
@@ -37,7 +40,7 @@ class WrongLink:
         return machine.with_inertial({self.parameter: self.values[kind].value})
 
     def beside(self, machine: Machine) -> str:
-        """The value that a machine has, and this one, in one sentence."""
+        """One sentence with the machine's value and the corrected one."""
         _, kind = split(self.parameter)
         new = self.values[MASS if kind == PAYLOAD else kind]
         said = f"{self.parameter}: {machine.body.parameters[self.parameter]:.4g} {new.unit} in the nominal model, "
@@ -51,7 +54,7 @@ def wrong_link(
     parameter: str,
     shown: JointResult,
 ) -> WrongLink:
-    """The values of a link's mass, inertia or payload, which the search at a joint has found to be wrong."""
+    """Correct values of a link's mass, inertia or payload, which the search at a joint has found to be wrong."""
     link, kind = split(parameter)
     if kind == PAYLOAD:
         payload = placed_payload(balances, records, found, link, shown.joint)
@@ -62,7 +65,9 @@ def wrong_link(
     label, chosen = f"{BODY}.{parameter}", shown.result.chosen
     value = chosen.model.parameters[label]
     size, mass = value.value, f"{BODY}.{link}.{MASS}"
-    if kind == TURNING and mass in chosen.elements:  # where the mass took its shape's inertia with it
+    if (
+        kind == TURNING and mass in chosen.elements
+    ):  # the search changed the mass together with the inertia of its shape
         known = shown.case.nominal
         size += known.value(label) * (chosen.model.value(mass) / known.value(mass) - 1.0)
     return WrongLink(parameter, {kind: Estimate(size, chosen.std().get(label, 0.0), value.unit)}, shown)

@@ -1,4 +1,4 @@
-"""Backward elimination: every chosen effect is tried against being left out, and against others in their place."""
+"""Backward elimination: test whether each chosen effect can be left out or replaced by another one."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -12,7 +12,7 @@ from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 
-# elements that scored best at first, and of those that fit best alone, so many are tried again in the place of each of several effects
+# number of elements that scored best at first, and of those that fit best alone, that are tried in place of each of several effects
 RIVALS_TRIED = 2
 
 
@@ -27,11 +27,11 @@ def eliminate(
     margin: float,
     tell: Tell,
 ) -> tuple[Trial, dict[tuple[str, ...], Trial]]:
-    """Backward elimination of the added elements; returns the survivor and the models that were tried on the way.
+    """Backward elimination of the added elements; returns the remaining model and all models tried.
 
-    First whether it can be left out, then whether another one does better in its place: a simpler member of its family,
-    or, where there are several effects, an element that scored well before the others were known or fits well alone. What is exchanged may
-    make others idle. A model that says less may be worse by the `margin` in the criterion.
+    First test whether an effect can be left out. Then test replacements: a simpler member of its family or, where there are several
+    effects, an element that scored well before the others were known or that fits well alone. A replacement may make other effects
+    needless. A simpler model is preferred if its criterion is worse by less than `margin`.
     """
     tried: dict[tuple[str, ...], Trial] = {}
 
@@ -80,7 +80,7 @@ def _swaps(
     alone: Mapping[str, Trial],
     rounds: Sequence[Round],
 ) -> list[Proposal]:
-    """Models with another element in the place of one of the effects."""
+    """Models with one of the effects replaced by another element."""
     swaps: list[Proposal] = []
     scored = {score.element.name for score, _ in distinct(rounds[0].scores, RIVALS_TRIED)}
     for label in best.added:
@@ -94,13 +94,13 @@ def _swaps(
         for name in sorted(names - {best.element(other).name for other in best.added}):
             starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
             beside: list[dict[str, float]] = []
-            if starts and name in family:  # a special case of the best is at its best close to it
+            if starts and name in family:  # start a special case at the values of the law that contains it
                 own = {parameter.name for parameter in catalogue[name].parameters}
                 values = _values(best, label).items()
                 starts.insert(0, starts[0] | {key: value for key, value in values if key in own})
             elif tuple(sorted((*rest, name))) in trials:
                 continue
-            elif name in alone:  # what it needs beside it the fit with it alone has found
+            elif name in alone:  # the fit with this effect alone also gives the other parameters
                 starts, beside = [_values(alone[name], name), *starts], [_given(alone[name], slim)]
             if starts:
                 swaps.append(propose(slim, catalogue[name], starts, rest, beside=beside))
@@ -108,28 +108,28 @@ def _swaps(
 
 
 def _alone(single: Sequence[Trial]) -> dict[str, Trial]:
-    """Of models with one effect, all under one noise and the best first, those that fit best, by its name."""
+    """The best models with one effect, by its name, from models sorted by fit under one noise model."""
     named = [(trial.element(trial.added[0]).name, trial) for trial in single[:RIVALS_TRIED]]
     return {name: trial for name, trial in named if name == trial.added[0]}
 
 
 def _values(trial: Trial, label: str) -> dict[str, float]:
-    """Values of the parameters of the element under a label."""
+    """Parameter values of the element with a label."""
     return {p.name: trial.model.value(f"{label}.{p.name}") for p in trial.element(label).parameters}
 
 
 def _given(trial: Trial, model: Model) -> dict[str, float]:
-    """A trial's values of the parameters that another model has free, too."""
+    """A trial's values of the parameters that are free in another model, too."""
     return {name: trial.model.value(name) for name in model.free if name in trial.model.parameters}
 
 
 def _rest(trial: Trial, slim: Model) -> tuple[str, ...]:
-    """The effects that are left in a model without some of them."""
+    """The added effects that are still in a reduced model."""
     return tuple(name for name in trial.added if slim.term(name) is not None)
 
 
 def _stands_for(trial: Trial, best: Trial) -> bool:
-    """Whether a model says less than the best: some of its effects, or a special case in the place of one of them."""
+    """Whether a model is simpler than the best: a subset of its effects, or a special case in place of one of them."""
     if trial.free >= best.free:
         return False
     if set(trial.added) < set(best.added):
@@ -147,7 +147,7 @@ def _starts_for(
     rounds: Sequence[Round],
     count: int,
 ) -> list[dict[str, float]]:
-    """First guesses of an element for a refit: those that scored best in any round, or its own."""
+    """First guesses of an element for a refit: those with the best scores in any round, else the element's own."""
     scored = sorted(
         (s for r in rounds for s in r.scores if s.element.name == name and s.statistic > 0.0),
         key=lambda s: -s.statistic,

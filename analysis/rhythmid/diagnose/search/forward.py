@@ -1,8 +1,8 @@
-"""Forward search for missing elements, then pruning: the model that explains the records with the fewest effects.
+"""Forward search for missing elements, then backward elimination: the model that explains the records with the fewest effects.
 
-Each round scores the whole catalogue (cheap), refits the most promising elements with everything free (dear), and keeps
-the best if it is worth its parameters. Afterwards backward elimination tries every element: against being left out, against
-a simpler member of its family, and, where there are several, against the other candidates.
+Each round scores the whole catalogue (cheap), refits the most promising elements with all parameters free (expensive), and keeps the
+best one if the gain justifies its parameters. Backward elimination then tests every element: whether it can be left out or replaced
+by a simpler member of its family or, where there are several effects, by another candidate.
 """
 
 import math
@@ -45,30 +45,32 @@ from rhythmid.progress import Tell
 
 Array = NDArray[np.float64]
 
-SHARE = 5e-4  # of what is explained already, below which a further effect is an imperfection of the others
+SHARE = 5e-4  # share of the gain so far below which a further effect counts as an imperfection of the others
 LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
-GROUPS = 3  # of so many elements that are refitted for the first effect, one after the other, while none does better
-# difference of the criterion within which models are compared again under the noise that they leave, and the same as a share of what
-# the best of them gains: a noise model that is coloured by what is missing puts a surrogate ahead by so much (Silverbox: a ripple before the
+GROUPS = 3  # groups of elements that are refitted in turn for the first effect until one improves the fit
+# difference of the criterion within which models are compared again under the noise that they leave, absolute and as a share of the
+# best one's gain. A noise model coloured by the missing effect can rank a surrogate first by as much (Silverbox: a ripple before the
 # cubic spring by 0.15 % of the gain)
 NEAR, NEAR_SHARE = 60.0, 0.01
-# gain in the criterion from which a model is worth a second look where a better one does not hold under the noise that it
-# leaves; and how many of them get it
+# gain in the criterion from which further models are examined if the better ones fail under the noise that they leave, and the
+# number of such models
 PLAIN, SECOND = 100.0, 2
-UNDERSTATED = 0.1  # share of what a refit gains that a score shows at least, where an effect is far from its first guess
-EFFECTS_AT_ONCE = 3  # effects at once
+UNDERSTATED = (
+    0.1  # smallest ratio of a score to the gain of the refit, for an effect far from its first guess
+)
+EFFECTS_AT_ONCE = 3  # largest number of effects
 RIVALS_COMPARED = 4  # models of each number of effects that are compared at the end
-OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
+OVERTAKEN = 4  # rankings at the end, each under the noise left by the best model of the previous one
 
 
 @dataclass(frozen=True)
 class Search:
-    """What the search found.
+    """The result of the search.
 
     `nominal` is the refitted nominal model, `best` the chosen one (the nominal one when nothing is missing) and `fit` its
-    full fit, all under the same `noise`. `trials` are all models that were refitted, by information criterion;
-    `excluded` those that could not be simulated, with the reason. `cut_short` says whether the budget ended the search before all
-    effects that scored well were tried.
+    full fit, all under the same `noise`. `trials` are all refitted models, sorted by information criterion. `excluded` are
+    those that could not be simulated or were not tried, with the reason. `cut_short` says whether the budget ended the search
+    before all effects that scored well were tried.
     """
 
     nominal: Fit
@@ -83,7 +85,7 @@ class Search:
 
 @dataclass(frozen=True)
 class _Task:
-    """What all rounds of a search need; `floor` is the least standard deviation of a noise, `step` [s] the nominal model's."""
+    """Input of all rounds of a search; `floor` is the smallest standard deviation of a noise model, in the output's unit."""
 
     series: Sequence[Series]
     nominal: Fit
@@ -99,17 +101,18 @@ class _Task:
         return self.nominal.run.max_step
 
     def noise_left(self, trial: Trial, noise: NoiseModel) -> NoiseModel:
-        """The noise that a model leaves which is fitted under another one."""
+        """Noise model of the residual that a model leaves when fitted under another noise model."""
         fit = whole_fit(trial, self.series, noise, self.step, pool=self.pool)
         return noise_of(fit.residuals, self.series, self.floor)
 
 
 @dataclass(frozen=True)
 class _State:
-    """Where a search stands.
+    """The state of a search.
 
-    `best` is the chosen model under the `noise` that it leaves, `here` the same under the noise of the last round, out of which the
-    catalogue's guesses are taken, and `current` its fit there. `gained` is what all effects together have improved the criterion by.
+    `best` is the chosen model under the `noise` that it leaves. `here` is the same model under the noise of the last round, from
+    which the effects of the catalogue's guesses are removed; `current` is its fit there. `gained` is the improvement of the
+    criterion by all effects together.
     """
 
     best: Trial
@@ -123,21 +126,21 @@ class _State:
 
     @property
     def margin(self) -> float:
-        """What a further effect has to improve the criterion by."""
+        """Required improvement of the criterion by a further effect."""
         return max(WORTH, SHARE * self.gained)
 
     def with_trials(self, trials: Sequence[Trial]) -> "_State":
-        """The state that knows these trials, too."""
+        """The state with these trials added."""
         return replace(self, trials={**self.trials, **{tuple(sorted(one.added)): one for one in trials}})
 
     def without(self, tried: Sequence[tuple[tuple[str, ...], str]]) -> "_State":
-        """The state that knows, too, what was not tried, or could not be simulated."""
+        """The state with additional exclusions: models that were not tried or could not be simulated."""
         return replace(self, excluded=(*self.excluded, *tried))
 
 
 @dataclass(frozen=True)
 class _Grant:
-    """A model that explains the records better, by so much of the criterion, and the noise that it leaves."""
+    """An accepted model, its gain in the criterion, and the noise that it leaves."""
 
     winner: Trial
     gain: float
@@ -154,10 +157,19 @@ def search(
     budget: Budget | None = None,
     most: int = EFFECTS_AT_ONCE,
 ) -> Search:
-    """Search the catalogue for what the nominal model lacks; `nominal` is the fit to the same series of the one `given`.
+    """Search the catalogue for what the nominal model lacks.
 
-    At most `most` effects are found. Once the `budget` is spent no further round begins, and fits that are under way end with what they
-    have; what was not tried is told among the excluded.
+    Parameters
+    ----------
+    series : the fitted series.
+    nominal : the fit of the nominal model to them.
+    given : the nominal model as given.
+    catalogue : elements that may be missing.
+    pool : threads that simulate.
+    tell : called with a sentence at the beginning of each step.
+    budget : once it is spent no further round begins, and fits in progress return what they have; what was not tried is
+        listed in `Search.excluded`.
+    most : largest number of effects.
     """
     budget = budget or Budget()
     with deadline(budget.at(SEARCHED)):
@@ -196,7 +208,7 @@ def _searched(
 
 
 def _begun(task: _Task, first: Round) -> _State:
-    """The state before any effect, the first round scored."""
+    """The state before any effect, with the first round scored."""
     fit = task.nominal
     felt = felt_starts(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
     base = Trial(
@@ -208,8 +220,10 @@ def _begun(task: _Task, first: Round) -> _State:
 
 
 def _cut_off(state: _State) -> list[tuple[tuple[str, ...], str]]:
-    """What is not tried any more once the budget is spent: the elements that scored best, or all that may stand beside the effects
-    that were found last, after which nothing was scored."""
+    """What is not tried after the budget is spent.
+
+    The elements that scored best, or if nothing was scored after the last effect, all further effects beside those found.
+    """
     added, last = state.best.added, state.rounds[-1]
     if last.added != added:
         return [((f"further effects beside {' and '.join(added)}",), SPENT)]
@@ -217,12 +231,12 @@ def _cut_off(state: _State) -> list[tuple[tuple[str, ...], str]]:
 
 
 def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
-    """Refits of the models that the last round proposes, those that do better than the best so far, best first."""
+    """Refit the models proposed by the last round; returns those that improve on the best so far, best first."""
     here, now = state.here, replace(state.rounds[-1], added=state.here.added)
     count = refitted(now, REFITTED if not state.best.added else REFITTED - 1)
     begun = task.series, Origin.of(here), here.noise, task.step
     found, failed = [], []
-    # where nothing is found yet and none of the best does better, they were kin that the scores, which are linear, promise too much of
+    # if none improves on the nominal model, try the next group: the linear scores may overrate a family of related elements
     for first in range(0, count * (1 if state.best.added else GROUPS), count):
         proposed, enough = proposals(here.model, now, count, here.chi2, first)
         if any(one.chi2 < here.chi2 for one in found) or not proposed:
@@ -234,12 +248,14 @@ def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
         proposed = from_given(task.nominal, task.given, task.catalogue, here.chi2, task.pool)
         others, lost = run_trials(proposed, *begun, tell=task.tell)
         found, failed = better_of([*found, *others]), failed + lost
-    found = [one for one in found if one.chi2 < here.chi2]  # a richer model that does worse got lost
+    found = [
+        one for one in found if one.chi2 < here.chi2
+    ]  # a richer model with a worse fit has ended in a bad minimum
     return state.without(failed).with_trials(found), found
 
 
 def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State, _Grant | None]:
-    """The refit that explains the records best, where it is worth its parameters under the noise that it leaves."""
+    """Accept the refit that explains the records best if it justifies its parameters under the noise that it leaves."""
     if not found:
         return state, None
     best, here = state.best, state.here
@@ -250,7 +266,7 @@ def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State
         top = _most_likely(group, task.series, here.noise, task.step, task.floor)
         fit = _finely_fitted(task, top, here.noise)
         sought = top
-        # a clock is sought once more beside what came after it
+        # the clock's period is sought again beside the effect added after it
         if any(has_clock(top.model, label) for label in top.added[-2:]):
             fit = ticks_sought(fit, task.floor, task.pool)
             sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
@@ -264,13 +280,15 @@ def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State
         gain = before.bic() - winner.bic()
         if winner.added != best.added and gain >= state.margin:
             return state, _Grant(winner, gain, settled)
-    # what the noise model of the round saw in them, the noise that they leave does not bear out
+    # the gains under the noise model of the round do not hold under the noise that the models leave
     return state, None
 
 
 def _finely_fitted(task: _Task, trial: Trial, noise: NoiseModel) -> Fit:
-    """The whole fit of a trial, in steps that are fine enough for what it leaves: what was an error of integration beside a mismatch may
-    be all that is left once that is explained."""
+    """The full fit of a trial, with steps fine enough for its residual.
+
+    An integration error that is negligible beside a mismatch may dominate the residual once the mismatch is explained.
+    """
     fit = whole_fit(trial, task.series, noise, task.step, pool=task.pool)
     if time_is_up():
         return fit
@@ -282,7 +300,7 @@ def _finely_fitted(task: _Task, trial: Trial, noise: NoiseModel) -> Fit:
 
 
 def _with_effect(task: _Task, state: _State, grant: _Grant, last: bool) -> _State:
-    """The state with one effect more, the next round scored where it is not the last one."""
+    """The state with one more effect, and with the next round scored unless it is the last one."""
     best = in_best_order(grant.winner, task.series, grant.noise, task.step)
     gained = state.gained + grant.gain + grant.winner.chi2 - best.chi2
     task.tell(f"{best.added[-1]} explains it better by {grant.gain:.0f}; looking for more")
@@ -309,7 +327,7 @@ def _reduced(task: _Task, state: _State) -> _State:
 
 
 def _ranked(task: _Task, state: _State) -> tuple[Trial, NoiseModel, list[Trial]]:
-    """The best model once all are compared under the noise that it leaves, that noise, and the models, best first."""
+    """The best model when all are compared under the noise that it leaves, that noise model, and all models, best first."""
     best, noise, step = state.best, state.noise, task.step
     ranked = _contenders(state.trials, best)
     for _ in range(OVERTAKEN):
@@ -318,7 +336,7 @@ def _ranked(task: _Task, state: _State) -> tuple[Trial, NoiseModel, list[Trial]]
         ahead = state.margin if ranked[0].free > best.free else WORTH
         if ranked[0].bic() >= best.bic() - ahead or not ranked[0].added:
             return best, noise, ranked
-        best = ranked[0]  # a model set aside under an earlier noise model has overtaken the chosen one
+        best = ranked[0]  # a model rejected under an earlier noise model is now better than the chosen one
         noise = task.noise_left(best, noise)
     ranked = near_under_noise(ranked, task.series, noise, step, NEAR)
     return next(one for one in ranked if set(one.added) == set(best.added)), noise, ranked
@@ -327,9 +345,9 @@ def _ranked(task: _Task, state: _State) -> tuple[Trial, NoiseModel, list[Trial]]
 def _most_likely(
     near: Sequence[Trial], series: Sequence[Series], noise: NoiseModel, step: float, floor: float
 ) -> Trial:
-    """The one of several close models whose remainder predicts itself best: each under the noise that it leaves.
+    """The model among several close ones with the smallest innovations, each under a noise model of its own residual.
 
-    The first noise model is coloured by the effect that is missing and can put a surrogate ahead by a little.
+    The first noise model is coloured by the missing effect and can rank a surrogate slightly better.
     """
     if len(near) == 1 or time_is_up():
         return near[0]
@@ -342,20 +360,27 @@ def _most_likely(
 
 
 def _could_pay(state: _State) -> bool:
-    """Whether the best score of the last round, which can understate what a refit gains, is more than chance, of the order that an
-    element has to earn, and that an effect of practical size has."""
+    """Whether a further effect could be accepted.
+
+    The best score of the last round must be significant. It must also be of the order that an element has to gain and that an
+    effect of practical size has, taking into account that a score can understate the gain of a refit.
+    """
     now, series, noise = state.rounds[-1], state.current.run.series, state.current.noise
     if now.chance >= LEVEL or state.current.nrmse() ** 2 < UNDERSTATED * PRACTICAL**2:
         return False
-    power = sum(one.power(one.used) for one in series)  # the number of samples times the motion's mean square
+    power = sum(
+        one.power(one.used) for one in series
+    )  # number of samples times the mean square of the motion
     practical = PRACTICAL**2 * power / max(noise.variance, noise.long_run_variance)
     earned = 0.5 * (state.margin + math.log(max(state.best.samples, 2)))
     return now.strongest > max(earned, UNDERSTATED * practical)
 
 
 def _contenders(trials: Mapping[tuple[str, ...], Trial], best: Trial) -> list[Trial]:
-    """The models worth comparing at the end: the nominal one, the best of each number of effects, and the chosen one with all
-    that it is without some of its effects: what each of them brings is judged against these."""
+    """The models to compare at the end, against which each effect's contribution is judged.
+
+    They are the nominal model, the best of each number of effects, and the chosen model with its effects left out.
+    """
     ranked = sorted(trials.values(), key=lambda t: t.bic())
     kept = {tuple(sorted(t.added)): t for t in [trials[()], best]}
     for count in {len(t.added) for t in ranked if t.added}:

@@ -1,7 +1,7 @@
-"""The order of effects in a chain: a limit before a lag is another machine than a limit behind it.
+"""The order of effects in a chain: a limit before a lag and a limit behind it are different machines.
 
-Command path, actuator and sensor pass a signal from one effect to the next; forces just add. An effect that joins others
-stands behind them at first, for its score needs no place.
+In the command path, the actuator and the sensor each effect acts on the output of the one before; forces just add. A new effect
+is first placed behind the others, because its score does not depend on the order.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ CHAINS = ("command", "actuator", "sensor")
 
 
 def in_best_order(trial: Trial, series: Sequence[Series], noise: NoiseModel, step: float) -> Trial:
-    """The trial, or the same effects with the newest one at another place of its chain, where that fits better."""
+    """The trial, or the same effects with the newest one moved along its chain where that fits better."""
     others = [Proposal(trial.added, model, ({},)) for model in other_orders(trial.model, trial.added[-1])]
     if not others or time_is_up():
         return trial
@@ -28,7 +28,7 @@ def in_best_order(trial: Trial, series: Sequence[Series], noise: NoiseModel, ste
 
 
 def other_orders(model: Model, label: str) -> Iterator[Model]:
-    """The model with the term called `label` at each other place of its chain; none where it stands alone or in no chain."""
+    """The model with the term called `label` at each other place of its chain; none if it is alone or in no chain."""
     moving = model.term(label)
     if moving is None or not _passes_on(moving, moving.element.slot):
         return
@@ -43,7 +43,7 @@ def other_orders(model: Model, label: str) -> Iterator[Model]:
 
 
 def _passes_on(term: Term, slot: str) -> bool:
-    """Whether a term is a link of the slot's chain: delays commute with what others do, controllers take what is left."""
+    """Whether a term is a link of the slot's chain. Delays are not, because they commute; controllers are not, either."""
     element = term.element
     return (
         slot in CHAINS

@@ -1,7 +1,7 @@
-"""Refit the model with candidate elements, everything free, and compare what they reach.
+"""Refit the model with candidate elements, all parameters free, and compare the results.
 
-A comparison needs one noise model for all: it is estimated from what the best candidate leaves, because the effect
-that is missing from the others must not be taken for coloured noise.
+A comparison needs one noise model for all candidates. It is estimated from the residual of the best one, because the effect that
+the others lack must not be taken for coloured noise.
 """
 
 import math
@@ -37,37 +37,37 @@ from rhythmid.progress import Tell, counted, silent
 
 Array = NDArray[np.float64]
 SKETCH, BRIEF, FULL, THOROUGH = 3, 6, 15, 20  # iterations
-STEEP = 0.8  # of chi2, below which as many iterations as in a sketch have to bring a descent that goes on
-CARRIED_ON = 0.3  # share of the spread of chi2 within which a model is carried to convergence
-# share of its ceiling, above which the best of a round has found so little that all minima of all trials are gone through
+STEEP = 0.8  # ratio of chi2 that `SKETCH` iterations must reach for a descent to continue
+CARRIED_ON = 0.3  # share of the spread of chi2 up to which a model is fitted to convergence
+# ratio to the ceiling above which the best of a round has gained so little that all minima of all trials are searched
 LITTLE = 0.5
-HOPS = 12  # at most, from one minimum to the next
-HOP_DISTANCES = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
-# of the samples: excess of chi2 over that of the best model, beyond which a model is out of the question on unseen data, too: a gain in
-# log likelihood of a twentieth per sample, where a few per record decide
+HOPS = 12  # largest number of hops from one minimum to the next
+HOP_DISTANCES = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # lengths of a hop, times the distance between minima
+# excess of chi2 over that of the best model, per sample, beyond which a model cannot compete on unseen data either: a loss in log
+# likelihood of a twentieth per sample, while a few per record decide
 EXCESS = 0.1
-LEAST_EXCESS = 60.0  # the same for few samples
-# of the longest step at most, however often a run is looked at: of samples 20 ms apart to 0.3 ms. Beyond it is no error of integration that
-# is left, but jumps, such as a dead band's, that fall elsewhere with every step
+LEAST_EXCESS = 60.0  # smallest excess, for few samples
+# largest number of halvings of the longest step, over all checks of a run: from samples 20 ms apart to 0.3 ms. An error that remains
+# is not due to integration but to jumps, such as a dead band's, whose instants change with every step
 MOST_HALVINGS = 6
-TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
+TOLERANCE = 0.05  # change of chi2 at which a trial has converged, far below the gain that an element needs
 
 
 def fine_enough(run: FreeRun, model: Model, starts: Sequence[Array], noise: float) -> FreeRun:
-    """The run in steps whose error of integration is far below the `noise` (rms): an element may be stiff, or bend its force within a step."""
+    """The run with steps whose integration error is far below the `noise` (rms), also for stiff elements and kinks."""
     left = MOST_HALVINGS - round(math.log2(run.longest_step / run.max_step))
     return sufficient(run, model, starts, INTEGRATION * noise, left) if left > 0 else run
 
 
 def _run_of(trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float) -> FreeRun:
-    """Run of a trial, in steps of `max_step` [s] at most, fine enough for this noise."""
+    """The run of a trial, with steps of at most `max_step` [s], fine enough for this noise."""
     return fine_enough(
         prepare_run(trial.model, series, max_step), trial.model, trial.starts, noise.variance**0.5
     )
 
 
 def reach_of(chi2: float, samples: int) -> float:
-    """Chi2 that a model has to come to in order to matter beside the best one, with its `chi2` over the `samples`."""
+    """Chi2 that a model must reach to compete with the best one, whose `chi2` was obtained with `samples` samples."""
     return chi2 + max(LEAST_EXCESS, EXCESS * samples)
 
 
@@ -80,9 +80,10 @@ def _fit_proposal(
     enough: float,
     reach: float,
 ) -> Outcome:
-    """A few iterations from each guess, more from the best as long as it may come to `reach`; no further guess is tried once chi2 falls below `enough`.
+    """Fit a structure: a few iterations from each guess, more from the best one as long as it may reach `reach`.
 
-    Raises InputError when the model diverges from every guess, or a deadline had passed before the first.
+    No further guess is tried once chi2 is below `enough`. Raises InputError when the model diverges from every guess, or when a
+    deadline has passed before the first.
     """
     if time_is_up():
         raise InputError(SPENT)
@@ -132,8 +133,11 @@ def _fit_proposal(
 def _carried_on(
     end: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel, reach: float = math.inf
 ) -> Descent:
-    """The descent carried on to `BRIEF` iterations, and beyond as long as it still falls steeply: in a narrow, bent valley it
-    comes from far away and can be the deepest in the end. It is given up where it would not come to `reach` at its rate."""
+    """Continue the descent to `BRIEF` iterations, and further as long as chi2 falls steeply.
+
+    In a narrow, curved valley a descent is slow but may end in the deepest minimum. It is abandoned if at its rate it would not
+    reach `reach`.
+    """
     done, steep, costs = SKETCH, True, [end.chi2]
     while not (end.converged or time_is_up()) and (done < BRIEF or (steep and done < THOROUGH)):
         if len(costs) > 1 and out_of_reach(costs[-2], costs[-1], (THOROUGH - done) / SKETCH, reach):
@@ -145,7 +149,7 @@ def _carried_on(
 
 
 def _hops(trial: Trial, series: Sequence[Series]) -> dict[str, float]:
-    """Parameters of the newest effect that have many minima, and how far these lie apart."""
+    """Parameters of the newest effect that have many minima, with the distance between them."""
     newest = trial.model.term(trial.added[-1]) if trial.added else None
     if newest is None or newest.element.hops is None:
         return {}
@@ -154,7 +158,7 @@ def _hops(trial: Trial, series: Sequence[Series]) -> dict[str, float]:
 
 
 def _in_deepest(trial: Trial, series: Sequence[Series], max_step: float) -> Outcome:
-    """Where a trial ends in the deepest of the minima that its newest effect has, as far as hops from one to the next lead there."""
+    """The outcome of a trial in the deepest minimum of its newest effect that hops from one minimum to the next reach."""
     run = _run_of(trial, series, trial.noise, max_step)
     names = tuple(trial.model.free)
     best = descend(trial.model, run, names, trial.noise, trial.starts, 1, None, TOLERANCE, trial.differences)
@@ -166,7 +170,7 @@ def _in_deepest(trial: Trial, series: Sequence[Series], max_step: float) -> Outc
 def _hopped(
     best: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel, name: str, distance: float
 ) -> Descent:
-    """The deepest of the minima that a parameter has at about this distance, as far as every next one is deeper."""
+    """Hop along a parameter whose minima lie about this distance apart, as long as the next one is deeper."""
     low, high = best.model.parameters[name].bounds
     for _ in range(HOPS):
         if time_is_up():
@@ -185,15 +189,20 @@ def _hopped(
 
 
 def _flat(model: Model, steps: Array, names: Sequence[str]) -> list[str]:
-    """Those of the named parameters that have wandered to where they change nothing: a step large enough to be felt is
-    larger than their value. What they did before, when the others were still wrong, says nothing against them now."""
+    """Parameters among those named that have no effect at their present values.
+
+    The step that would change the output is larger than the value. They may have drifted there while the other parameters were
+    still wrong, so they deserve another try.
+    """
     felt = dict(zip(model.free, steps))
     return [name for name in names if name in felt and abs(felt[name]) > abs(model.value(name))]
 
 
 def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
-    """The trial with flat parameters of its effects tried again from the elements' own guesses, where that is better: one
-    iteration from each, for all others are where they belong, more from the best."""
+    """Try parameters that have no effect again from the elements' own guesses; the trial is kept if that is not better.
+
+    One iteration from each guess, because all other parameters are at their best values; then more from the best guess.
+    """
     best = trial
     if trial.differences is None or time_is_up():
         return best
@@ -232,12 +241,12 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
 
 
 def _steps(end: Descent, run: FreeRun, without: Collection[str]) -> dict[str, float]:
-    """Steps of a descent by name, without those of parameters that have moved."""
+    """Difference steps of a descent by name, except those of parameters that have moved."""
     return steps_by_name(end.model, run.compiled.layout.states, end.differences, without)
 
 
 def _extended(model: Model, run: FreeRun, origin: Origin) -> list[Array]:
-    """Starts of each series for a structure with other states: those that it shares are kept, new ones begin at rest."""
+    """Initial states of each series for a structure with other states: shared states are kept, new ones begin at rest."""
     found = []
     for index, start in enumerate(origin.starts):
         fresh = start_of(model, run, index, float(start[0]), float(start[1]))
@@ -258,10 +267,12 @@ def run_trials(
     reach: float = math.inf,
     tell: Tell = silent,
 ) -> tuple[list[Trial], list[tuple[tuple[str, ...], str]]]:
-    """Fit all proposals in parallel, beginning from the `origin`. Returns the trials, best first, and those excluded with the reason.
+    """Fit all proposals in parallel, beginning from the `origin`.
 
-    A few iterations from each guess first, until chi2 is `enough`; then the promising ones are carried to convergence, as long as
-    they may come to `reach`: a chi2 that one has to come to in order to matter.
+    First a few iterations from each guess, until chi2 is below `enough`. The promising trials are then fitted to convergence, as
+    long as they may reach `reach`, the chi2 that a competitive model needs.
+
+    Returns the trials, best first, and the excluded structures with the reasons.
     """
     goals = list(enough) if enough is not None else [-math.inf] * len(proposals)
 
@@ -278,7 +289,7 @@ def run_trials(
             trials.append(trial_of(proposals[index].added, proposals[index].model, result, noise))
     if not trials or time_is_up():
         return sorted(trials, key=lambda t: t.bic()), excluded
-    # many minima are gone through only where that can matter: few descents are as dear
+    # all minima are searched only where that can matter: this needs more descents than any other step
     ceilings = {proposal.added: proposal.ceiling for proposal in proposals}
     lowest = min(trial.chi2 for trial in trials)
     hopping = [
@@ -301,7 +312,7 @@ def run_trials(
 
 
 def _promising(trial: Trial, trials: Sequence[Trial]) -> bool:
-    """Whether a trial is near the best of all."""
+    """Whether a trial's chi2 is near the best one."""
     best, worst = min(one.chi2 for one in trials), max(one.chi2 for one in trials)
     return trial.chi2 - best <= CARRIED_ON * max(worst - best, trial.samples)
 
@@ -314,8 +325,10 @@ def whole_fit(
     pool: ThreadPoolExecutor | None = None,
     reach: float = math.inf,
 ) -> Fit:
-    """The full fit of a trial under a noise model; one that has converged under it is only evaluated, one that would not come to
-    `reach` is not carried to convergence."""
+    """The full fit of a trial under a noise model.
+
+    A trial that has converged under it is only evaluated. One that would not reach `reach` is not fitted to convergence.
+    """
     run = _run_of(trial, series, noise, max_step)
     return minimise(
         trial.model, run, tuple(trial.model.free), noise, trial.starts, 1 if _settled(trial, noise) else FULL, pool,
@@ -331,8 +344,10 @@ def under_noise(
     iterations: int = FULL,
     reach: float = math.inf,
 ) -> list[Trial]:
-    """The trials, best first, all under one noise model: those that were fitted under another are fitted again, as far as they may
-    come to `reach`; without `iterations` they stay as they are."""
+    """The trials under one noise model, best first.
+
+    Trials fitted under another one are refitted, as far as they may reach `reach`; with `iterations` 0 they are only evaluated.
+    """
     done = [trial for trial in trials if _settled(trial, noise)]
     others = [trial for trial in trials if not _settled(trial, noise)]
 
@@ -361,15 +376,18 @@ def under_noise(
 
 
 def _settled(trial: Trial, noise: NoiseModel) -> bool:
-    """Whether a trial was fitted under this noise model and is at its end, or has to stay where a deadline has left it."""
+    """Whether a trial was fitted under this noise model and has converged, or no time is left."""
     return trial.noise is noise and (trial.converged or time_is_up())
 
 
 def near_under_noise(
     trials: Sequence[Trial], series: Sequence[Series], noise: NoiseModel, max_step: float, near: float
 ) -> list[Trial]:
-    """The trials, best first, under one noise model: as they are, but those `near` the best are fitted again, also from
-    guesses of parameters that have wandered to where they change nothing."""
+    """The trials under one noise model, best first.
+
+    Those `near` the best are refitted, also from new guesses of parameters that have no effect at their present values. The others
+    are only evaluated.
+    """
     level = under_noise(trials, series, noise, max_step, 0)
     close = [trial for trial in level if trial.bic() - level[0].bic() < near]
     fitted = [_unstuck(trial, series, max_step) for trial in under_noise(close, series, noise, max_step)]

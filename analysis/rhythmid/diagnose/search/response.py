@@ -1,5 +1,8 @@
-"""What a force does to a free run, to first order: by its tangent linear model or, for a model that keeps a history, by the difference to a
-run with a small part of the force, scaled back."""
+"""First-order response of a free run to a force.
+
+Computed by the tangent linear model. For a model that keeps a history, by the difference to a run with a small part of the force,
+scaled back.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -13,14 +16,14 @@ if TYPE_CHECKING:
     from rhythmid.diagnose.search.score_tests import Trajectories
 
 Array = NDArray[np.float64]
-SMALL = 1e-3  # of the force that shakes the machine: the part of a force that is tried is no larger
+SMALL = 1e-3  # ratio of the applied part of a force to the force that moves the machine, at most
 
 
 def response(known: "Trajectories", index: int, force: Array) -> Array | None:
-    """Change (n,) of what series `index` measures at its block centres that a force (n,) along its path makes; None where the model diverges."""
+    """Change (n,) of the measurement of series `index` at its block centres by a force (n,); None where the model diverges."""
     tangent = known.tangents[index]
     change = _by_difference(known, index, force) if tangent is None else tangent.response(force)
-    bounded = change is not None and float(np.abs(change).max()) < DIVERGED  # NaN is not
+    bounded = change is not None and float(np.abs(change).max()) < DIVERGED  # false for NaN, too
     return change if bounded else None
 
 

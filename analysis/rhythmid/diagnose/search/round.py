@@ -1,4 +1,4 @@
-"""One round of the search: scores of the whole catalogue at a fit, along whole records and in short windows of them."""
+"""One round of the search: scores of the whole catalogue at a fit, along whole records and in short windows."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -33,10 +33,10 @@ from rhythmid.identify.output_error import Fit, coloured, minimise
 from rhythmid.identify.series import Series
 
 Array = NDArray[np.float64]
-MISFIT = 0.1  # error, as a share of the motion, from which a residual that follows from its own past is not whitened away
-# windows in which the catalogue is scored: enough to see every amplitude, few enough to cost less than the records
+MISFIT = 0.1  # error, as a share of the motion, from which a residual with autocorrelation is not whitened
+# windows in which the catalogue is scored: enough for all amplitudes, few enough to cost less than the records
 WINDOWS = 40
-REMEMBERED = 4  # times what the noise remembers, that a window is longer than at least
+REMEMBERED = 4  # minimum length of a window, in correlation times of the noise
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class Round:
     ----------
     scores : scores along the whole records, best first.
     p_value : probability of such a best score by chance.
-    added : labels of the effects that the scored model had already.
-    local : scores in short windows, best first. A score is linear in what is missing. Along a whole record a wrong force
-        adds up to a wrong phase, which is not; in a window it cannot get far.
+    added : labels of the effects in the scored model.
+    local : scores in short windows, best first. A score is linear in the missing effect. Along a whole record a missing force
+        accumulates a phase error, which is nonlinear; in a short window this error stays small.
     """
 
     scores: tuple[Score, ...]
@@ -61,14 +61,14 @@ class Round:
     def chance(self) -> float:
         """Probability of such a best score by chance, along the whole records or in windows (Bonferroni).
 
-        Either test alone is blind to something: what moves the machine out of proportion cancels along whole records and is taken
-        for the colour of the noise there, what is slow is hidden in windows.
+        Each of the two tests is blind to some effects. A nonlinear response cancels along whole records and is taken for
+        coloured noise there. A slow effect is hidden in windows.
         """
         return min(1.0, 2.0 * min(self.p_value, p_value(self.local)))
 
     @property
     def strongest(self) -> float:
-        """The highest statistic of all scores; 0 without any."""
+        """The largest statistic of all scores; 0 without any."""
         return max((group[0].statistic for group in (self.scores, self.local) if group), default=0.0)
 
 
@@ -85,12 +85,12 @@ def distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Scor
 def noise_without(
     fit: Fit, changes: Iterable[Change], filters: Iterable[tuple[Array, ...]] = (), most: int = 60
 ) -> NoiseModel:
-    """Noise model of the residual less what the catalogue's best guesses and linear filters together explain of it.
+    """Noise model of the residual after removing what the catalogue's best guesses and linear filters explain together.
 
-    The residual of a model that lacks something is not noise: a regular motion that is missed can be predicted from its
-    own past, so it would pass for colour and be whitened away. Where nothing is missing the guesses take out no more
-    than their number of degrees of freedom, which is given back. `filters` are changes of each series' block averages by a linear
-    part that the catalogue may lack.
+    The residual of a model that lacks an effect is not noise. A regular motion can be predicted from its own past; it would be taken
+    for coloured noise and whitened away. If nothing is missing, the guesses remove no more than their number of degrees of freedom,
+    for which the variance is corrected. `filters` are changes of each series' block averages by linear dynamics that the
+    catalogue may lack.
     """
     samples = sum(int(one.used.sum()) for one in fit.run.series)
     best = best_changes(fit, changes, min(most, samples // 50))
@@ -120,9 +120,9 @@ def noise_without(
 def one_round(
     fit: Fit, added: tuple[str, ...], catalogue: Catalogue, pool: ThreadPoolExecutor | None
 ) -> tuple[Round, Fit]:
-    """Score the catalogue at a fit, under the noise that its best guesses leave; returns the fit under that noise, too.
+    """Score the catalogue at a fit, under the noise left by its best guesses; also returns the fit under that noise.
 
-    What is missing, such as a slow drift, would otherwise pass for the colour of the noise, in later rounds as in the first.
+    Otherwise a missing effect, such as a slow drift, would be taken for coloured noise, in later rounds as in the first.
     """
     noise = noise_without(fit, _changes(fit, catalogue, pool), _filters(fit, pool))
     if fit.nrmse() > MISFIT and noise.is_structure:
@@ -134,13 +134,13 @@ def one_round(
 
 
 def _changes(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> Iterator[Change]:
-    """Changes that the whole catalogue makes at a fit: they are told from what its parameters do only where these are linearised."""
+    """Changes of the output by all first guesses of the catalogue, linearised at the fit."""
     known = trajectories(fit)
     return changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
 
 
 def _filters(fit: Fit, pool: ThreadPoolExecutor | None) -> Iterator[tuple[Array, ...]]:
-    """Changes that linear filters of the past velocity and of the past actuator force make at a fit, when they are asked for."""
+    """Changes of the output by linear filters of the past velocity and actuator force at a fit, computed on demand."""
     for one in filtered(trajectories(fit), pool):
         yield from one.columns
 
@@ -157,8 +157,10 @@ def not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[tuple[tu
 
 
 def scored_in_windows(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> list[Score]:
-    """Scores of the catalogue in short windows of the records, the model refitted there; none where the fit is of such windows
-    already, or where the model diverges."""
+    """Scores of the catalogue in short windows of the records, with the model refitted there.
+
+    Empty where the fit already uses such windows, or where the model diverges.
+    """
     length = float(np.median([periods_long(one) for one in fit.run.series]))
     cut = windows(fit.run.series, length)
     if len(cut) < 2 * len(fit.run.series):
@@ -175,7 +177,7 @@ def scored_in_windows(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor |
 
 
 def _within(noise: NoiseModel, cut: Sequence[Series]) -> NoiseModel:
-    """The noise as short windows can be whitened: one that remembers more than a quarter of a window counts as white."""
+    """The noise model for whitening short windows: white if its memory exceeds a quarter of a window."""
     if REMEMBERED * noise.order < min(one.blocks for one in cut):
         return noise
     return NoiseModel(np.empty(0), noise.variance**0.5)

@@ -1,9 +1,9 @@
 """Score tests: which elements of the catalogue would explain the residual of the nominal fit?
 
-For each first guess of each element the change of the free run is found by adding the element's force along the fitted
-trajectory as a disturbance of its tangent linear model (its change of the output, for sensors; the changed stamps, for timing). Projected off what
-the nominal parameters and initial states can do, its correlation with the residual is Rao's score statistic,
-asymptotically chi-squared with one degree of freedom when the element is absent
+For each first guess of each element the change of the free run is computed to first order. The element's force along the fitted
+trajectory disturbs the tangent linear model; a sensor element changes the output, a timing element the stamps. The part that the
+nominal parameters and initial states can reproduce is projected out. The correlation with the residual is then Rao's score
+statistic, asymptotically chi-squared with one degree of freedom when the element is absent
 (C. R. Rao, Math. Proc. Camb. Phil. Soc. 44 (1948) 50). Nothing is compiled or fitted for a guess.
 """
 
@@ -39,13 +39,13 @@ from rhythmid.simulation.signal import first_order_hold, is_held
 from rhythmid.simulation.transport import delayed_command, delays, physical_times
 
 Array = NDArray[np.float64]
-# averages in all, beyond which changes are kept to seven digits: a score needs no more
+# total number of block averages from which changes are stored in single precision, which suffices for a score
 FULL_PRECISION_ROWS = 200_000
 
 
 @dataclass(frozen=True)
 class Change:
-    """What one first guess of one element does to the free run: `outputs`, block averages of each series."""
+    """Change of the free run by one first guess of one element; `outputs` are block averages of each series."""
 
     key: int
     element: Element
@@ -57,9 +57,9 @@ class Change:
 class Score:
     """How well one first guess of one element explains the residual.
 
-    `statistic` is the score test's chi-squared; `size` the factor on the guess that fits best (an element whose sign is
-    physics scores 0 when that is negative). `beside` are the changes of the model's own parameters that go with the guess of
-    size one: what of the effect they had stood in for.
+    `statistic` is the score test's chi-squared. `size` is the best factor on the guess; an element whose sign is fixed by
+    physics scores 0 if it is negative. `beside` are the changes of the model's own parameters for a guess of size one: the part
+    of the effect that they had compensated for.
     """
 
     key: int
@@ -71,9 +71,9 @@ class Score:
 
     @property
     def start(self) -> dict[str, float]:
-        """First guess for a refit: the size scaled to what the score suggests."""
+        """First guess for a refit, scaled by the size from the score test."""
         if not self.element.size or math.isinf(self.element.absent):
-            return dict(self.values)  # a limit: its effect is not in proportion to it
+            return dict(self.values)  # a limit: its effect is not proportional to its value
         scaled = dict(self.values)
         name = self.element.size
         low, high = self.element.parameter(name).bounds
@@ -84,12 +84,12 @@ class Score:
 
     @property
     def _factor(self) -> float:
-        """The size of the first guess: neither nothing nor far beyond what was scored."""
+        """The factor on the first guess, kept away from zero and from values far beyond the scored one."""
         factor = float(np.clip(self.size, -30.0, 30.0))
         return math.copysign(max(abs(factor), 0.05), factor)
 
     def own(self, model: Model, factor: float | None = None) -> dict[str, float]:
-        """Values of the model's own parameters beside the first guess, or beside the guess times `factor`, within their bounds."""
+        """Values of the model's own parameters beside the first guess, times `factor` if given, within their bounds."""
         found = {}
         for name, change in self.beside.items():
             low, high = model.parameters[name].bounds
@@ -100,18 +100,18 @@ class Score:
 
 @dataclass(frozen=True)
 class Trajectories:
-    """The fitted free run: paths of all series and the structure that takes disturbances.
+    """The fitted free run: paths of all series, and the run to which disturbances are applied.
 
-    `legs` are the paths as the leg sees them: relative to its base where that moves.
+    `legs` are the paths as seen by the leg: relative to its base where that moves.
     """
 
     fit: Fit
     disturbed: FreeRun
     paths: tuple[Path, ...]
     legs: tuple[Path, ...]
-    outputs: tuple[Array, ...]  # of each series at its block centres, as the sensor says
+    outputs: tuple[Array, ...]  # sensor output of each series at its block centres
     commands: tuple[Array, ...]
-    states: tuple[Array, ...]  # of each series at its block centres
+    states: tuple[Array, ...]  # states of each series at its block centres
     shaken: float  # typical acceleration (rms) of the strongest motion
 
     @property
@@ -129,7 +129,7 @@ class Trajectories:
 
 
 def trajectories(fit: Fit) -> Trajectories:
-    """Run the fitted model once and keep all that elements may depend on."""
+    """Run the fitted model once and store all signals that elements may depend on."""
     run = fit.run
     disturbed = replace(
         prepare_run(fit.model, run.series, run.max_step, disturbed=True), max_step=run.max_step
@@ -141,7 +141,7 @@ def trajectories(fit: Fit) -> Trajectories:
         if rows is None:
             raise InputError(f"{one.name}: the fitted model diverges")
         model = own_model(fit.model, one)
-        # the machine was there when the measurement was taken, not when it was stamped
+        # the time at which the measurement was taken, not its stamp
         time = one.centres - float(np.mean(one.centres - physical_times(model, one.centres)))
         acceleration = np.gradient(rows[:, 1], time)
         body = _body_force(model, time, rows[:, 0], rows[:, 1], rows[:, q + 1])
@@ -187,7 +187,7 @@ def _body_force(model: Model, time: Array, x: Array, v: Array, f: Array) -> Arra
 def change_of_output(
     known: Trajectories, element: Element, values: Mapping[str, float]
 ) -> list[Array] | None:
-    """Change of each series' block-averaged output when the element with these values joins the fitted model.
+    """Change (blocks,) of each series' block-averaged output when the element with these values joins the fitted model.
 
     None when the model diverges with it.
     """
@@ -195,7 +195,7 @@ def change_of_output(
     changes: list[Array] = []
     if element.delay is not None or element.history:
         model = fit.model.with_element(element, values, fixed=True)
-        # what keeps a history changes what a controller does ever after, and is simulated
+        # an element with a history changes a controller's output from then on; it is simulated
         kept = prepare_run(model, fit.run.series, fit.run.max_step) if element.history else fit.run
         outputs = kept.outputs(model, fit.starts)
         if outputs is None:
@@ -223,7 +223,7 @@ def change_of_output(
         elif element.acts != "body":
             path = known.legs[index]
         force = effect_along(element, values, model, path)
-        if not float(np.abs(force).max()) < DIVERGED:  # NaN included
+        if not float(np.abs(force).max()) < DIVERGED:  # true for NaN, too
             return None
         change = response(known, index, force)
         if change is None:
@@ -251,18 +251,18 @@ def _change_of_reference(known: Trajectories, index: int, change: Array) -> Arra
 
 
 def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Array]:
-    """Used stretches of each series, whitened and joined."""
+    """Used stretches (n,) of each series, whitened under a noise model and concatenated; `samples` has one array a series."""
     series = fit.run.series
     return [one.whitened(noise, given, one.stretches(noise)) for one, given in zip(series, samples)]
 
 
 def projected(fit: Fit, white: Sequence[Array]) -> Array:
-    """A whitened change of each series as the fit's rows (n,) see it, what initial states can do projected out."""
+    """A whitened change of each series on the fit's rows (n,), with the effect of initial states projected out."""
     return np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
 
 
 def parameter_basis(fit: Fit) -> tuple[Array, Array]:
-    """Orthonormal basis (n, r) of what small changes of the free parameters do, and (p, r) the changes that make each."""
+    """Orthonormal basis (n, r) of the output changes by the free parameters, and the parameter changes (p, r) of each."""
     jacobian = fit.linearisation.jacobian
     norms = np.linalg.norm(jacobian, axis=0)
     felt = norms > 0.0
@@ -276,10 +276,10 @@ def parameter_basis(fit: Fit) -> tuple[Array, Array]:
 
 
 def sizes_along(known: Trajectories) -> Scales:
-    """Yardstick for first guesses at a fit: the records' scales, and what only the fitted run tells."""
+    """Scales for first guesses at a fit: those of the records, and those of the fitted run."""
     fit = known.fit
     sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
-    efforts = [path.effort for path in known.paths]  # the controller's or the motor's force
+    efforts = [path.effort for path in known.paths]  # force of the controller or of the motor
     return replace(
         sizes,
         effort=max(float(np.std(effort)) for effort in efforts) or sizes.effort,
@@ -288,7 +288,7 @@ def sizes_along(known: Trajectories) -> Scales:
 
 
 def guesses(catalogue: Catalogue, model: Model, sizes: Scales) -> list[tuple[Element, dict[str, float]]]:
-    """First guesses of every element that could be missing from the model."""
+    """First guesses of every element that may be missing from the model."""
     return list(candidates(catalogue, model.setting, sizes).tried)
 
 
@@ -297,8 +297,10 @@ def changes_of(
     candidates: Sequence[tuple[Element, dict[str, float]]],
     pool: ThreadPoolExecutor | None = None,
 ) -> Iterator[Change]:
-    """Changes that all guesses make, each simulated when it is nearly its turn: those of a whole catalogue over long records are large.
-    Those that make the model diverge, or change nothing, are left out."""
+    """Changes by all guesses, simulated on demand because those of a whole catalogue over long records are large.
+
+    Guesses that make the model diverge, or change nothing, are left out.
+    """
 
     def one(case: tuple[int, tuple[Element, dict[str, float]]]) -> Change | None:
         key, (element, values) = case
@@ -307,14 +309,14 @@ def changes_of(
             return None
         with np.errstate(over="ignore", invalid="ignore"):
             kept = _kept(outputs)
-            finite = all(math.isfinite(o @ o) for o in kept)  # the squares, too, of which scores are made
+            finite = all(math.isfinite(o @ o) for o in kept)  # the squares in a score must be finite, too
         return Change(key, element, values, kept) if finite else None
 
     return (change for change in each(one, enumerate(candidates), pool) if change is not None)
 
 
 def _kept(outputs: Sequence[Array]) -> tuple[Array, ...]:
-    """Changes as they are scored and kept: in half the memory over records that are very long."""
+    """Changes in the precision in which they are stored: single for very long records."""
     if sum(map(len, outputs)) <= FULL_PRECISION_ROWS:
         return tuple(outputs)
     return tuple(cast(Array, one.astype(np.float32)) for one in outputs)
@@ -326,25 +328,25 @@ def score(fit: Fit, changes: Iterable[Change]) -> list[Score]:
 
 
 def best_changes(fit: Fit, changes: Iterable[Change], count: int) -> list[Change]:
-    """The `count` changes that score best under the fit's noise model, best first; no others are kept meanwhile."""
+    """The `count` changes with the best scores under the fit's noise model, best first; no others are stored meanwhile."""
     best = heapq.nlargest(count, scored(fit, changes), key=lambda pair: pair[0].statistic)
     return [change for _, change in best]
 
 
 def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change]]:
-    """Changes with their scores under the fit's noise model; without those that the nominal parameters can make, too."""
+    """Changes with their scores under the fit's noise model, without those that the nominal parameters can reproduce."""
     left, made_by = parameter_basis(fit)
     residual = fit.linearisation.residual
     residual = residual - left @ (left.T @ residual)
     for one in changes:
-        with np.errstate(over="ignore", invalid="ignore"):  # what whitening makes too large is left out
+        with np.errstate(over="ignore", invalid="ignore"):  # changes that overflow in whitening are left out
             white = whitened(fit, one.outputs, fit.noise)
             raw = math.sqrt(sum(float(w @ w) for w in white))
             joined = projected(fit, white)
             change = joined - left @ (left.T @ joined)
             strength = float(change @ change)
         if not math.isfinite(strength) or raw == 0.0 or strength <= (1e-6 * raw) ** 2:
-            continue  # the nominal parameters do the same
+            continue  # within the span of the nominal parameters
         size = -float(change @ residual) / strength
         statistic = size**2 * strength
         if one.element.forbids(one.values, size):
@@ -355,12 +357,12 @@ def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change]
 
 
 def under(fit: Fit, noise: NoiseModel, pool: ThreadPoolExecutor | None = None) -> Fit:
-    """The fit repeated under another noise model, from where it is."""
+    """The fit repeated under another noise model, starting from its present values."""
     return minimise(fit.model, fit.run, fit.names, noise, fit.starts, 10, pool, differences=fit.differences)
 
 
 def residual_line(fit: Fit) -> float:
-    """Frequency [Hz] of the strongest line in the residuals: of the sum of all series' spectra, between their bins."""
+    """Frequency [Hz] of the strongest spectral line in the residuals: sum of all series' spectra, interpolated between bins."""
     period = fit.run.series[0].period * fit.run.series[0].block
     length = 8 * max(one.blocks for one in fit.run.series)
     power = np.zeros(length // 2 + 1)

@@ -1,7 +1,7 @@
-"""The tangent linear model of a free run: what small changes of state and force lead to over each interval between two rows.
+"""The tangent linear model of a free run: response to small changes of state and force over each interval between two rows.
 
-The derivative of the numerical solution itself, by differences over one interval each, so that they stay small however freely the
-machine swings (F. Rabier, P. Courtier, Q. J. R. Meteorol. Soc. 118 (1992) 649, linearise along a trajectory in the same way).
+It is the derivative of the numerical solution, by finite differences over one interval each, so that they stay small in a large
+motion (F. Rabier, P. Courtier, Q. J. R. Meteorol. Soc. 118 (1992) 649, linearise along a trajectory in the same way).
 """
 
 from dataclasses import dataclass
@@ -17,21 +17,24 @@ from rhythmid.simulation.machine_code import load_run
 from rhythmid.simulation.signal import FAR
 
 Array = NDArray[np.float64]
-# of the scatter of a state or of the given force, that is moved for a difference: the rounding of the outcome, 1e-16 of it, and
-# its curvature both leave the derivative to five digits
+# difference step, as a share of the scatter of a state or of the given force: with a rounding error of 1e-16 of the result, and its
+# curvature, the derivative is accurate to five digits
 DIFFERENCE = 1e-5
 
 
 @dataclass(frozen=True)
 class Tangent:
-    """Maps (n - 1, q + 1, q + 2) from the change of state and of the force at both ends of an interval to that of the next state and
-    output; `direct` is what the force does to the first output."""
+    """The linear maps of all intervals between n rows, for q states.
+
+    `maps` (n - 1, q + 1, q + 2) map the changes of the state (q) and of the force at both ends of an interval (2) to those of
+    the next state (q) and output (1). `direct` is the change of the first output per unit of force.
+    """
 
     maps: Array
     direct: float
 
     def response(self, force: Array) -> Array:
-        """Change (n,) of the output that a small force (n,) makes, straight between its values."""
+        """Change (n,) of the output by a small force (n,), linear between its values."""
         found = np.empty(len(force))
         load_run(tangent_module())(self.maps, self.direct, np.ascontiguousarray(force), found)
         return found
@@ -80,7 +83,7 @@ def tangent(run: FreeRun, model: Model, index: int, states: Array, force: float)
 
 
 class _Stretches:
-    """The pieces of a signal that act in each interval between times (n,)."""
+    """The pieces of a signal in each interval between times (n,)."""
 
     def __init__(self, signal: Pieces, times: Array) -> None:
         self.knots, self.coefficients = signal
@@ -93,7 +96,7 @@ class _Stretches:
 
 
 def _straight(begin: float, end: float, first: float, last: float) -> Pieces:
-    """A force that is straight between two values at two times, and constant outside."""
+    """A force that is linear between two values at two times, and constant outside."""
     coefficients = np.zeros((4, 3))
     coefficients[0] = first, first, last
     coefficients[1, 1] = (last - first) / (end - begin)

@@ -1,4 +1,4 @@
-"""Trials: candidate models, what is proposed to be fitted and what a fit has reached."""
+"""Trials: candidate models, proposals to fit, and results of fits."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -16,12 +16,12 @@ from rhythmid.model import Model
 from rhythmid.simulation.compiled import compile_model
 
 Array = NDArray[np.float64]
-FAINTER = (0.1, 0.01)  # shares of a guess that led nowhere, tried in its place
+FAINTER = (0.1, 0.01)  # shares of a guess that are tried where the guess itself does not help
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A candidate model, fitted: its structure, what was added to the nominal model, and how well it does."""
+    """A fitted candidate model: its structure, the additions to the nominal model, and the quality of the fit."""
 
     added: tuple[str, ...]
     model: Model
@@ -30,16 +30,18 @@ class Trial:
     samples: int
     free: int
     converged: bool
-    noise: NoiseModel  # under which chi2 was reached
-    differences: tuple[Array, Array] | None = None  # steps by which its sensitivities were taken
-    start_cost: float = 0.0  # of the starts of its elements' own states
+    noise: NoiseModel  # noise model of chi2
+    differences: tuple[Array, Array] | None = (
+        None  # difference steps of its sensitivities, for parameters and for states
+    )
+    start_cost: float = 0.0  # cost of the free initial states of its elements
 
     def bic(self) -> float:
-        """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461), with what free starts cost."""
+        """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461), plus the cost of free initial states."""
         return self.chi2 + self.free * math.log(max(self.samples, 2)) + self.start_cost
 
     def element(self, label: str) -> Element:
-        """The element that the model has under a label; KeyError if there is none."""
+        """The model's element with a label; KeyError if there is none."""
         term = self.model.term(label)
         if term is None:
             raise KeyError(label)
@@ -48,12 +50,13 @@ class Trial:
 
 @dataclass(frozen=True)
 class Origin:
-    """A fitted model that fits of other structures begin from.
+    """A fitted model from which fits of other structures begin.
 
     Parameters
     ----------
-    starts : initial state of each series, the states in the order of their names `states`.
-    steps : by which its sensitivities were taken, by name of parameter or state: a structure that has these, too, needs about the same.
+    starts : initial state of each series, in the order of the state names.
+    states : names of the states.
+    steps : difference steps of its sensitivities, by name of parameter or state; other structures reuse them.
     """
 
     starts: tuple[Array, ...]
@@ -62,7 +65,7 @@ class Origin:
 
     @classmethod
     def of(cls, trial: Trial) -> "Origin":
-        """The origin that a trial is."""
+        """The origin given by a trial."""
         states = compile_model(trial.model).layout.states
         steps = {} if trial.differences is None else steps_by_name(trial.model, states, trial.differences)
         return cls(trial.starts, states, steps)
@@ -71,14 +74,17 @@ class Origin:
 def steps_by_name(
     model: Model, states: Sequence[str], differences: tuple[Array, Array], without: Collection[str] = ()
 ) -> dict[str, float]:
-    """Difference steps of a model's free parameters and states by name, `without` those of what has moved elsewhere."""
+    """Difference steps of a model's free parameters and states by name, except for the names in `without`."""
     every = zip((*model.free, *states), np.concatenate(differences).tolist(), strict=True)
     return {name: step for name, step in every if name not in without}
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a worker sends back of a fit: plain numbers. `values` are of all parameters, for guesses differ in fixed ones, too."""
+    """The result of a fit in plain numbers, as returned by a worker.
+
+    `values` holds all parameters, because guesses may differ in fixed ones, too.
+    """
 
     values: dict[str, float]
     free: int
@@ -91,7 +97,7 @@ class Outcome:
 
 
 def outcome_of(end: Descent, run: FreeRun, noise: NoiseModel) -> Outcome:
-    """What a descent of a structure over a run has reached, under a noise model."""
+    """The result of a descent of a structure over a run, under a noise model."""
     values = {name: value.value for name, value in end.model.parameters.items()}
     cost = start_cost(felt_starts(end.model, run, noise, end.starts, end.residuals, end.differences[1]))
     return Outcome(
@@ -100,7 +106,7 @@ def outcome_of(end: Descent, run: FreeRun, noise: NoiseModel) -> Outcome:
 
 
 def trial_of(added: tuple[str, ...], model: Model, done: Outcome, noise: NoiseModel) -> Trial:
-    """The trial of a structure that ended in this outcome."""
+    """The trial of a structure with this result."""
     fitted = model.with_values(done.values)
     return Trial(
         added,
@@ -118,9 +124,9 @@ def trial_of(added: tuple[str, ...], model: Model, done: Outcome, noise: NoiseMo
 
 @dataclass(frozen=True)
 class Proposal:
-    """A structure to try: the model with the elements in it, and several first guesses (values by parameter name).
+    """A structure to try: the model with the added elements, and several first guesses (values by parameter name).
 
-    `ceiling` is the chi2 of a model that it contains, as far as that is known; `faint` are guesses close to that one.
+    `ceiling` is the chi2 of a model that it contains, if known. `faint` are guesses close to that model.
     """
 
     added: tuple[str, ...]
@@ -138,8 +144,10 @@ def propose(
     ceiling: float = math.inf,
     beside: Sequence[dict[str, float]] = (),
 ) -> Proposal:
-    """The base model, whose chi2 is `ceiling`, with one more element; `guesses` are values of the element's parameters, and those
-    `beside` each of the model's own."""
+    """The base model, whose chi2 is `ceiling`, with one more element.
+
+    `guesses` are values of the element's parameters; `beside` are values of the model's own parameters for each guess.
+    """
     extended = base.with_element(element, guesses[0])
     label = extended.terms[-1].label
 
@@ -153,7 +161,7 @@ def propose(
 
 
 def fainter(element: Element, guess: dict[str, float], share: float) -> dict[str, float]:
-    """Values of an element's parameters with its effect reduced to a share."""
+    """Values of an element's parameters with its effect scaled to a share."""
     value = guess[element.size]
     if math.isinf(element.absent):
         return guess | {element.size: value / share}

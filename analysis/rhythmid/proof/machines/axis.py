@@ -1,4 +1,4 @@
-"""A linear axis under a sampled position or velocity controller; its motor's force is recorded."""
+"""A linear axis under a sampled position or velocity controller; the force of its motor is recorded."""
 
 import math
 from collections.abc import Sequence

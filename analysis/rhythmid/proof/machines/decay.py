@@ -1,4 +1,4 @@
-"""An oscillator that is pulled aside and let go; nothing drives it."""
+"""An oscillator that is deflected and released; nothing drives it."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ EFFECTS = (
 
 
 def draw(rng: Rng, conceals: Sequence[str]) -> Rig:
-    """0.3 to 3 kg at 0.8 to 3 Hz with a damping ratio of 0.004 to 0.03, let go at 10 to 80 mm or a part of it."""
+    """0.3 to 3 kg at 0.8 to 3 Hz with a damping ratio of 0.004 to 0.03, released at 10 to 80 mm or a part of it."""
     mass, omega = log_uniform(rng, 0.3, 3.0), 2.0 * math.pi * rng.uniform(0.8, 3.0)
     stiffness = mass * omega**2
     damping = 2.0 * log_uniform(rng, 0.004, 0.03) * mass * omega
@@ -46,6 +46,6 @@ DESIGN = Design(
         "viscous_damper.damping": "damping",
     },
     (0.002, 0.02),
-    # three poles either way: a relaxation is a lag, from a start of its own
+    # both have three poles: a relaxation is equivalent to a lag with its own initial state
     alike=frozenset({"sensor_lag", "viscoelastic_relaxation"}),
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""All kinds of machines, in the order in which they take turns."""
+"""All types of machines, in the order in which they take turns."""
 
 from rhythmid.proof.machines import axis, decay, hopper, joint, motor, pendulum, servo, shaken
 from rhythmid.proof.machines.rig import Design

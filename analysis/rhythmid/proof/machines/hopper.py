@@ -23,7 +23,7 @@ EFFECTS = (
 
 
 def _draw_machine(rng: Rng) -> tuple[Machine, Forcing, float]:
-    """A machine, its forcing, and the amplitude [m] of the limit cycle that was aimed at."""
+    """A machine, its forcing, and the intended amplitude [m] of the limit cycle."""
     stiffness = math.exp(rng.uniform(math.log(50.0), math.log(800.0)))
     natural = rng.uniform(1.2, 3.5)
     mass = float(np.clip(stiffness / (2.0 * math.pi * natural) ** 2, 0.5, 3.0))
@@ -54,6 +54,6 @@ DESIGN = Design(
         "linear_spring.rest_length": "rest_length",
     },
     (0.008, 0.03), delays=("input", "measurement"), bags=True,
-    # friction that differs by direction shows its level only where the rest length has been measured
+    # for friction that differs by direction the level is identifiable only if the rest length has been measured
     known_with={"asymmetric_coulomb_friction": ("rest_length",)},
 )  # fmt: skip

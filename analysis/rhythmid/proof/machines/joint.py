@@ -1,4 +1,4 @@
-"""A joint with a heavy link under a sampled position controller; its motor's torque is recorded."""
+"""A joint with a heavy link under a sampled position controller; the torque of its motor is recorded."""
 
 import math
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ EFFECTS = (
 
 
 def draw(rng: Rng, conceals: Sequence[str]) -> Rig:
-    """A joint of 0.02 to 2 kg m² whose link would swing at 0.3 to 1 Hz by itself; the angle 0 is where it hangs."""
+    """A joint of 0.02 to 2 kg m² whose link would swing freely at 0.3 to 1 Hz; at the angle 0 it hangs down."""
     inertia = log_uniform(rng, 0.02, 2.0)
     rate = int(rng.choice(RATES))
     crossover = 2.0 * math.pi * rng.uniform(3.0, 8.0)

@@ -1,4 +1,4 @@
-"""A motor with a load, driven by a known current, of which a sensor measures the speed only. Torques are in amperes."""
+"""A motor with a load, driven by a known current; only the speed is measured. Torques are in amperes."""
 
 import math
 from collections.abc import Sequence

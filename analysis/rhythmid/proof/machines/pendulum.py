@@ -1,4 +1,4 @@
-"""A pendulum that swings wide, let go or driven by a known torque; its angle is recorded."""
+"""A pendulum with a large swing, released or driven by a known torque; its angle is recorded."""
 
 import math
 from collections.abc import Sequence
@@ -16,9 +16,9 @@ EFFECTS = (
 
 
 def draw(rng: Rng, conceals: Sequence[str]) -> Rig:
-    """A pendulum of 0.6 to 1.5 Hz at small swings, that swings to 0.6 to 2 rad.
+    """A pendulum of 0.6 to 1.5 Hz for small swings, with swings of 0.6 to 2 rad.
 
-    One that conceals its gravity is believed to hang on a spring, which is right for small swings.
+    If its gravity is concealed, the nominal model has a spring instead, which is correct for small swings.
     """
     inertia = log_uniform(rng, 0.005, 0.5)
     omega = 2.0 * math.pi * rng.uniform(0.6, 1.5)

@@ -1,4 +1,4 @@
-"""A machine with its experiments, and what is known of it: all of a case but effects and noise."""
+"""A machine with its experiments and the knowledge of it: a case without effects and noise."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,17 +12,20 @@ from rhythmid.proof.protocol import Run
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator
-FINER = 8  # knots a sample of a smooth command
-Recorded = Literal["command", "effort", "base", "reference", "nothing"]  # what drives it, as recorded
+FINER = 8  # knots of a smooth command for each sample
+Recorded = Literal[
+    "command", "effort", "base", "reference", "nothing"
+]  # the recorded channel that drives the machine
 
 
 @dataclass(frozen=True)
 class Rig:
-    """Everything of a case but effects and noise.
+    """All of a case without effects and noise.
 
-    `believed` is the machine as its nominal model describes it, were all its values right; `lacks` the effect that is part of
-    the machine but not of that description. `recorded` says which signal is logged beside the motion. `scale` [m] or [m/s] is
-    what the measurement's noise is in proportion to, `effort_noise` the rms of the effort's in proportion to the effort's own; `lag` [s] by how much the motion that is logged beside it is older.
+    `believed` is the machine as its nominal model describes it, with correct values. `lacks` is the effect that is part of the
+    machine but not of that description. `recorded` is the signal logged beside the motion. `scale` [m] or [m/s] is the size to
+    which the measurement's noise is proportional. `effort_noise` is the relative rms noise of the effort. `lag` [s] is the time by
+    which the logged motion is older than the signal beside it.
     """
 
     machine: Machine
@@ -47,14 +50,14 @@ class Rig:
         moved = self.recorded == "base"
         sent = (
             replace(run, rate=FINER * run.rate) if moved else run
-        )  # what moves a base is smooth between samples, too
+        )  # the motion of a base is smooth between samples, too
         return observe(
             self.machine, inside, scaled, sent.time, sent.command, self.input_delay, self.measurement_delay,
             slopes=sent.slopes if moved else None, start=run.start, velocity=self.velocity, samples=run.time, lag=self.lag,
         )  # fmt: skip
 
     def observe_all(self, effects: Sequence[Effect]) -> list[Observation] | None:
-        """The records to learn from; None where the machine diverges in one of them."""
+        """The records to fit; None where the machine diverges in one of them."""
         found = [self.observe(effects, run) for run in self.runs]
         kept = [one for one in found if one is not None]
         return kept if len(kept) == len(found) else None
@@ -62,12 +65,12 @@ class Rig:
 
 @dataclass(frozen=True)
 class Design:
-    """A kind of machine.
+    """A type of machine.
 
-    `effects` are the catalogue's that it may conceal; `draw` makes one of it that shows them; `unknown` tells which attribute
-    of the machine each parameter of the nominal model is that has to be estimated. `by_effort`: a mismatch is measured in the
-    effort, for a free run of such a machine means little. `noise` is the range of the measurement's noise in proportion to the
-    rig's scale; `delays`: nominal delays are part of the model. `alike` are effects that no record of such a machine tells apart.
+    `effects` are those of the catalogue that it may conceal. `draw` makes such a machine on which they are detectable. `unknown` maps
+    parameters of the nominal model that have to be estimated to attributes of the machine. `by_effort`: a mismatch is measured in
+    the effort, because a free run of such a machine is not meaningful. `noise` is the range of the measurement's noise relative to
+    the rig's scale. `delays`: nominal delays are part of the model. `alike` are effects that no record of such a machine separates.
     """
 
     name: str
@@ -82,13 +85,15 @@ class Design:
     alike: frozenset[str] = frozenset()
 
     def known(self, effects: Sequence[str]) -> tuple[str, ...]:
-        """Attributes that have been measured beforehand when these effects are concealed."""
+        """Attributes that are known when these effects are concealed, because they have been measured."""
         return tuple(name for effect in effects for name in self.known_with.get(effect, ()))
 
 
-LAGS = frozenset({"command_lag", "actuator_lag", "sensor_lag"})  # alike in a linear machine with one input
+LAGS = frozenset(
+    {"command_lag", "actuator_lag", "sensor_lag"}
+)  # indistinguishable in a linear machine with one input
 
 
 def log_uniform(rng: Rng, low: float, high: float) -> float:
-    """Drawn evenly in the logarithm."""
+    """A random value, uniform in its logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))

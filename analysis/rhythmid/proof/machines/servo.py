@@ -1,4 +1,4 @@
-"""A position servo of which only the command and the motion are known."""
+"""A position servo of which only the command and the motion are recorded."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""A mass on a base that is moved; the displacements of both are recorded."""
+"""A mass on a moved base; the displacements of both are recorded."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ EFFECTS = (
 
 
 def draw(rng: Rng, conceals: Sequence[str]) -> Rig:
-    """0.2 to 5 kg at 2 to 8 Hz with a damping ratio of 0.02 to 0.1, its base moved by parts of a millimetre or more."""
+    """0.2 to 5 kg at 2 to 8 Hz with a damping ratio of 0.02 to 0.1, on a base moved by fractions of a millimetre or more."""
     mass, natural = log_uniform(rng, 0.2, 5.0), rng.uniform(2.0, 8.0)
     omega = 2.0 * math.pi * natural
     stiffness = mass * omega**2
