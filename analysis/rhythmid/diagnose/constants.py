@@ -81,12 +81,10 @@ HOLDS = 0.95
 OPEN = 0.3
 VAGUE = 0.2
 VAGUENESS = 3.0
-# prior odds of a family on real machines, relative to the proof, which draws all effects equally often. Real machines have
-# friction. First runs stated names on recordings of real machines (docs/real.md): 26 of 28 names of friction and 5 of
-# 29 names of other families were accepted, a ratio of the odds of 60. Some causes of errors have been corrected since; so the
-# square root of the ratio is taken, and split evenly above and below one
+# prior odds of a family on real machines, relative to the proof, which draws all effects equally often; those of other families
+# are one. First runs on recordings of real machines stated 28 names of friction (docs/real.md), of which 26 were accepted: odds of
+# 13, where the sealed cases from which `HOLDS` comes have 5
 PRIOR_ODDS = {"friction": 3.0}
-PRIOR_ODDS_OF_OTHERS = 0.3
 # share of the measurement that a model may miss in a predictable way (from the residual's own past) for an answer to be given:
 # a model that misses more than half describes another machine
 MISSES_MOST = 0.5

@@ -16,7 +16,6 @@ from rhythmid.diagnose.constants import (
     HOLDS,
     OPEN,
     PRIOR_ODDS,
-    PRIOR_ODDS_OF_OTHERS,
     STEEPNESS,
     VAGUE,
     VAGUENESS,
@@ -72,7 +71,7 @@ def joint_probability(
 
 def prior_odds(family: str) -> float:
     """Prior odds of a family on real machines relative to the proof; one for an element without a family."""
-    return PRIOR_ODDS.get(family, PRIOR_ODDS_OF_OTHERS) if family else 1.0
+    return PRIOR_ODDS.get(family, 1.0)
 
 
 def chance_of_law(share: float, left: float, size_error: float = 0.0, family: str = "") -> float:
