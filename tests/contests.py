@@ -67,7 +67,7 @@ def contest(
     *hypotheses: Hypothesis, maps: Mapping[str, Prediction] | None = None, practical: float = PRACTICAL
 ) -> Contest:
     """The contest of these hypotheses, of thirty effects that were looked at."""
-    return Contest(hypotheses, maps or {}, 30, SIZE, practical)
+    return Contest(hypotheses, maps or {}, 30, SIZE, practical, practical)
 
 
 def decided(

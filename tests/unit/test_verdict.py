@@ -71,6 +71,12 @@ def test_a_line_that_does_not_go_on_in_held_out_data_is_no_unknown_physics(gain,
     assert verdict(contest(nominal, maps=line))[0] == expected
 
 
+@pytest.mark.parametrize(("unnamed", "expected"), [(0.05, "unknown_physics"), (0.2, "consistent")])
+def test_a_remainder_that_no_name_explains_counts_from_a_size_of_its_own(unnamed, expected):
+    made = contest(NOMINAL, maps={"position": predicted(0.1)})
+    assert verdict(replace(made, unnamed=unnamed))[0] == expected
+
+
 @pytest.mark.parametrize(("left", "expected"), [(0.19, 1), (0.05, 2)])
 def test_a_further_effect_has_to_remove_more_than_a_small_part_of_what_can_still_be_explained(left, expected):
     both = supposed("friction cubic", predicted(left, 2200.0))

@@ -44,6 +44,9 @@ RICHER = 0.02
 PRACTICAL = 0.003
 # the same as a share of the effort, of which models of real machines leave a larger share
 PRACTICAL_EFFORT = 0.005
+# size from which a remainder that no name explains is unknown physics, as a share of the effort. Models of real machines leave 2 to 5 %
+# of it, and a free function of the motion predicts part of that: filters, timing and sampling leave traces of the motion, too
+UNNAMED_EFFORT = 0.02
 # standard errors within which a simpler or related law counts as predicting equally well
 # (A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413)
 EQUIVALENT = 2.0

@@ -310,6 +310,7 @@ def _contest(
         len(names),
         rows.size,
         PRACTICAL,
+        PRACTICAL,
         follows=FOLLOWS,
         cut_short=found.cut_short,
         structured=structured,

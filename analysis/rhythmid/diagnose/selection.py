@@ -35,6 +35,7 @@ class Contest:
     candidates : number of effects tried for each place.
     size : rms of the signal that errors are a share of.
     practical : share of it below which an effect has no practical importance.
+    unnamed : share of it below which a remainder that no effect explains has none.
     ruled_out : hypotheses that the search has discarded because of their shape. They are rejected like others, and their
         predictions are not used for comparison.
     follows : error on held-out data, as a share of `size`, up to which a model follows the machine; infinite for an effort, whose
@@ -51,6 +52,7 @@ class Contest:
     candidates: int
     size: float
     practical: float
+    unnamed: float
     ruled_out: tuple[Hypothesis, ...] = ()
     follows: float = math.inf
     cut_short: bool = False

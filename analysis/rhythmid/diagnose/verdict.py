@@ -238,7 +238,7 @@ def decide(
         chosen.kind == "freed_value" and not (stated and stated[0] in chosen.effects),
         left.share,
         left.goes_with,
-        math.sqrt(left.least) / max(contest.practical * contest.size, 1e-300),
+        math.sqrt(left.least) / max(contest.unnamed * contest.size, 1e-300),
         missed,
         contest.structured * missed,
         contest.structured_after * missed,

@@ -7,7 +7,17 @@ table as Markdown.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import BLIND, EXPLAINED, LEFT, MAINLY, MISSES_MOST, STATED, VAGUE
+from rhythmid.diagnose.constants import (
+    BLIND,
+    EXPLAINED,
+    LEFT,
+    MAINLY,
+    MISSES_MOST,
+    PRACTICAL,
+    STATED,
+    UNNAMED_EFFORT,
+    VAGUE,
+)
 from rhythmid.diagnose.hypothesis import Kind, Verdict
 
 
@@ -115,7 +125,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
     VerdictRule(
         "unnamed_remainder",
         "no effect is accepted: rms that a free function or further effects predict beyond chance, two standard errors below its estimate, divided by "
-        "the smallest rms of practical importance",
+        f"that of practical importance, {100 * PRACTICAL:g} % of the motion or {100 * UNNAMED_EFFORT:g} % of the effort",
         1.0,
         "unknown_physics",
         "no effect of the catalogue explains the mismatch, which depends on {goes_with}",

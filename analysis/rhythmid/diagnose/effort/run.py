@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rhythmid.deadline import deadline
 from rhythmid.diagnose.case import SEARCHED, Case
-from rhythmid.diagnose.constants import PRACTICAL_EFFORT
+from rhythmid.diagnose.constants import PRACTICAL_EFFORT, UNNAMED_EFFORT
 from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
 from rhythmid.diagnose.effort.fitted import Fitted
@@ -178,6 +178,7 @@ def effort_run(
         places * found.candidates,
         size,
         PRACTICAL_EFFORT,
+        UNNAMED_EFFORT,
         tuple(claimed(one, ruled_out[one.elements]) for one in found.ruled_out),
         cut_short=found.cut_short,
     )
