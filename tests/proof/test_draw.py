@@ -207,4 +207,5 @@ def test_a_seal_that_was_tampered_with_is_refused(case, tmp_path):
 def test_two_effects_that_make_a_third_are_no_pair(catalogue):
     assert related(catalogue, "coulomb_friction", "constant_force")
     assert related(catalogue, "constant_force", "coulomb_friction")
+    assert related(catalogue, "asymmetric_coulomb_friction", "constant_force")
     assert not related(catalogue, "coulomb_friction", "quadratic_drag")

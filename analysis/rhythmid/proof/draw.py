@@ -109,8 +109,9 @@ def related(catalogue: Catalogue, first: str, second: str) -> bool:
     a, b = catalogue[first], catalogue[second]
     twins = any({first, second} <= group for group in EQUIVALENT)
     third = any(
-        (b.name in parts and whole in a.special_case_of) or (a.name in parts and whole in b.special_case_of)
+        (one.name in parts and whole in (other.name, *other.special_case_of))
         for whole, parts in SUMS.items()
+        for one, other in ((a, b), (b, a))
     )
     return (
         first == second or twins or third or (a.family != "" and a.family == b.family)
