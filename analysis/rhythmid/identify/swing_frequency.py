@@ -1,4 +1,4 @@
-"""Between which frequencies a free motion swings: where its law is not linear, they change with the amplitude as it decays."""
+"""Range of frequencies of a free oscillation: with a nonlinear law they change with the amplitude as it decays."""
 
 from collections.abc import Sequence
 
@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 from rhythmid.identify.series import Series, moving_part
 
 Array = NDArray[np.float64]
-LEAST_SWING_SHARE = (
-    0.1  # of the largest swing, below which swings are not looked at: noise crosses zero as it likes
-)
-OUTER = (0.05, 0.95)  # quantiles of the frequencies of all swings, beyond which they are taken for errors
+# share of the largest swing below which swings are ignored: noise causes random zero crossings
+LEAST_SWING_SHARE = 0.1
+OUTER = (0.05, 0.95)  # quantiles of the frequencies of all swings outside which they are taken for errors
 
 
 def swing_frequencies(series: Sequence[Series]) -> tuple[float, float]:
