@@ -25,8 +25,7 @@ from rhythmid.record.messages import Messages
 from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
-# share of a block per integration step: when a delay meets the sample grid, coarser steps corrupt the finite
-# differences
+# share of a block per integration step: when a delay meets the sample grid, coarser steps corrupt the finite differences
 FINE = 0.05
 
 
@@ -46,8 +45,7 @@ class Bound:
 
 
 def planned_record(experiment: Experiment) -> Record:
-    """Record that an experiment would give without noise: inputs and timestamps. Of its motion only the start is
-    used."""
+    """Record that an experiment would give without noise: inputs and timestamps. Of its motion only the start is used."""
     topics = perform(replace(experiment, noise=Noise()))
     command, forcing, output = topics["excitation"], topics["forcing"], topics["joint_states"]
     if output.position is None or command.effort is None or forcing.effort is None:
@@ -67,15 +65,13 @@ def _seconds(messages: Messages) -> Array:
 
 
 def cramer_rao(model: Model, records: Record | Sequence[Record], std: float, cycle: bool = True) -> Bound:
-    """Bound at the model's own values, for records with these inputs and timestamps; arguments as for
-    `expected_fit`."""
+    """Bound at the model's own values, for records with these inputs and timestamps; arguments as for `expected_fit`."""
     fit = expected_fit(model, records, std, cycle)
     return Bound(fit.names, fit.covariance)
 
 
 def expected_fit(model: Model, records: Record | Sequence[Record], std: float, cycle: bool = True) -> Fit:
-    """The fit at the model's own values whose covariance is the bound, for records with these inputs and
-    timestamps.
+    """The fit at the model's own values whose covariance is the bound, for records with these inputs and timestamps.
 
     `std` [output unit] is the standard deviation of white noise on a single sample. Only the start of each record's
     output is used, so planned and real records can both be given. With `cycle` False the limit cycle contributes no

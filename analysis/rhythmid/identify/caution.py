@@ -10,8 +10,7 @@ GIVEN_VALUES = "Are the values that the model is given near the machine's? If so
 
 @dataclass(frozen=True)
 class Caution:
-    """A doubt in words and the `question` that settles it, with the parameter, its estimate and its nominal
-    value."""
+    """A doubt in words and the `question` that settles it, with the parameter, its estimate and its nominal value."""
 
     name: Name
     text: str
@@ -26,8 +25,7 @@ class Caution:
 
 
 def not_identified(motion: float, response: float | None) -> Caution:
-    """The fit leaves too much of the `motion`, or of the `response` to the command, unexplained (shares of the
-    rms)."""
+    """The fit leaves too much of the `motion`, or of the `response` to the command, unexplained (shares of the rms)."""
     left = f"{100.0 * motion:.0f} % of the motion" if motion < 1.0 else "more than all of the motion"
     if response is not None:
         left = f"{100.0 * min(response, 9.99):.0f} % of the response to the command"

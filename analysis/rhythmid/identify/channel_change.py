@@ -48,8 +48,7 @@ class Change:
 
 
 def likely_changes(record: Record, model: Model) -> list[Change]:
-    """Changes of unit or sign that the record's channels may need. Of two with the same effect, the likelier is
-    first."""
+    """Changes of unit or sign that the record's channels may need. Of two with the same effect, the likelier is first."""
     position = model.units.position
     degrees = (DEGREE, 1.0 / DEGREE) if position == "rad" else ()
     found = [Change("output", factor) for factor in (*degrees, *THOUSAND)]

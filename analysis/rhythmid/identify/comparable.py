@@ -12,8 +12,8 @@ from rhythmid.identify.series import Series
 def check_comparable(series: Sequence[Series]) -> None:
     """Raise InputError when records cannot come from one machine in the same units.
 
-    The unit shows in how much the outputs vary. The levels alone do not show it: multi-turn counters and encoders
-    with another zero shift them by any amount, which `record_zeros` estimates.
+    The unit shows in how much the outputs vary. The levels alone do not show it: multi-turn counters and encoders with
+    another zero shift them by any amount, which `record_zeros` estimates.
     """
     spread = [float(np.std(one.averaged)) for one in series]
     level = [float(np.mean(one.averaged)) for one in series]

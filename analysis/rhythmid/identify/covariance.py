@@ -50,8 +50,7 @@ def _own_part(rows: Array) -> Array:
 
 
 def on_the_edge(model: Model, names: Sequence[str], covariance: Array) -> dict[str, float]:
-    """Bounds of the parameters that lie within a small part of their standard deviation from a bound, but not on
-    it."""
+    """Bounds of the parameters that lie within a small part of their standard deviation from a bound, but not on it."""
     found: dict[str, float] = {}
     for name, variance in zip(names, np.diag(covariance)):
         value = model.value(name)

@@ -43,8 +43,7 @@ def own_model(model: Model, one: Declaring) -> Model:
 
 
 def with_declared(model: Model, records: Sequence[Declaring]) -> Model:
-    """The model for all records: a parameter that every record declares is fixed at the mean of the declared
-    values.
+    """The model for all records: a parameter that every record declares is fixed at the mean of the declared values.
 
     Raises InputError where a record declares a parameter that the model does not have.
     """

@@ -23,11 +23,9 @@ LARGEST = 1.0  # [s] largest sum of the delays that is searched
 
 @dataclass(frozen=True)
 class DelayEstimate:
-    """Delays [s] with standard deviations. `input` and `measurement` are None where only their `sum` is
-    identifiable.
+    """Delays [s] with standard deviations. `input` and `measurement` are None where only their `sum` is identifiable.
 
-    `aliases` are further nonnegative pairs (τ_u, τ_y) with the same phases. `error` is the root of the integral in
-    (16).
+    `aliases` are further nonnegative pairs (τ_u, τ_y) with the same phases. `error` is the root of the integral in (16).
     """
 
     sum: float
@@ -140,8 +138,8 @@ def _scatter(estimate: HtfEstimate, phase: _Phase, delays: Array, fitted: int) -
 def fit_delays(estimate: HtfEstimate, model: Complex, m: int) -> DelayEstimate:
     """Paper, equation (16): (τ_u, τ_y) that minimise √∫₀⁴⁰ (|Ĝ_m| ∠G_err)² dω, from harmonic m alone.
 
-    `model` (h, n) are the parametric model's HTFs at the estimate's frequencies. Only nonnegative delays are
-    sought. Raises InputError where the excitation does not reach the harmonic.
+    `model` (h, n) are the parametric model's HTFs at the estimate's frequencies. Only nonnegative delays are sought.
+    Raises InputError where the excitation does not reach the harmonic.
     """
     phase = _phase(estimate, model, m)
     slope, intercept = _start(phase, offset=m != 0)

@@ -35,8 +35,7 @@ BRINK = 1e-3  # share of the first distance below which a parameter may reach th
 
 
 def first_guess(model: Model, run: FreeRun) -> list[Array]:
-    """State at the first block of each series: position and slope of a straight line fitted to its first
-    samples."""
+    """State at the first block of each series: position and slope of a straight line fitted to its first samples."""
     found: list[Array] = []
     for index, one in enumerate(run.series):
         span = 0.05 / max(dominant_frequency(one), 1e-9)
@@ -114,8 +113,8 @@ def _step(
 class Descent:
     """End of a search for the best parameters: the content of a `Fit`, without the sensitivities there.
 
-    `differences` are the finite-difference steps (p,) and (q,) of parameters and initial states for the
-    sensitivities. `linearisation` is present where the last one was computed at the end point itself.
+    `differences` are the finite-difference steps (p,) and (q,) of parameters and initial states for the sensitivities.
+    `linearisation` is present where the last one was computed at the end point itself.
     """
 
     model: Model

@@ -51,8 +51,7 @@ def driven(record: Record, model: Model) -> Record:
 
 
 def drive_of(before: Record, after: Record) -> str | None:
-    """One sentence that names the driving channel where `driven` chose another than the record's input; else
-    None."""
+    """One sentence that names the driving channel where `driven` chose another than the record's input; else None."""
     if after is before:
         return None
     channel: Channel | None = after.input

@@ -17,8 +17,7 @@ Array = NDArray[np.float64]
 PARTS = 6  # of a record, each with its own lag
 LEAST_SAMPLES = 64  # least samples in a part; fewer give no lag
 FARTHEST = 0.25  # largest lag on either side, as a share of a part
-# least lead, in samples of the slower channel: an input that is taken for held but is not gives a lead of 1.5
-# samples
+# least lead, in samples of the slower channel: an input that is taken for held but is not gives a lead of 1.5 samples
 EARLIEST = 1.5
 SURE = 4.0  # standard errors by which the lead must exceed that, as for a delay that comes out negative
 # largest ratio of the residual at the best lead to that at the best lag: with a single sine either channel seems to
@@ -32,8 +31,7 @@ def early_outputs(records: Sequence[Record]) -> list[str]:
 
 
 def early_output(record: Record) -> str | None:
-    """A note where the output leads the reference; None where it does not, or where the two are different
-    quantities."""
+    """A note where the output leads the reference; None where it does not, or where the two are different quantities."""
     if record.input is None or record.input_kind != "reference" or record.input.unit != record.output.unit:
         return None
     found = _lead(record)

@@ -23,8 +23,7 @@ def effort_note(records: Sequence[Record], model: Model, nrmse: float) -> str | 
     model : the nominal model.
     nrmse : share of the motion that the free run leaves unexplained.
 
-    Returns None where the effort cannot be scored, or where the balance leaves as large a share as the free run
-    does.
+    Returns None where the effort cannot be scored, or where the balance leaves as large a share as the free run does.
     """
     way = applicable(records, model)
     if not way.applies:

@@ -66,10 +66,8 @@ class FreeRun:
     def rows(self, model: Model, index: int, start: Array, disturbance: PPoly | None = None) -> Array | None:
         """Rows (blocks, states + 2) of the compiled loop at the block centres of series `index`.
 
-        `start` is the state at the first centre. Parameters that the record declares replace the model's own.
-        Returns
-        None when the simulation diverges. Raises ValueError when the length of `start` is not that of the state
-        vector.
+        `start` is the state at the first centre. Parameters that the record declares replace the model's own. Returns
+        None when the simulation diverges. Raises ValueError when the length of `start` is not that of the state vector.
         """
         if start.shape != (self.states,):  # the compiled loop would read past its end
             raise ValueError(f"a start of shape {start.shape} for {self.states} states")
@@ -130,8 +128,7 @@ def _ticks(series: Sequence[Series]) -> list[float]:
 def prepare_run(
     model: Model, series: Sequence[Series], max_step: float | None = None, disturbed: bool = False
 ) -> FreeRun:
-    """Prepare the model's structure for the series. Raises InputError when series of different input kinds are
-    mixed.
+    """Prepare the model's structure for the series. Raises InputError when series of different input kinds are mixed.
 
     `max_step` [s] None means at most one Runge-Kutta step per block, or per command value where steps end at knots.
     """
@@ -217,6 +214,5 @@ def coarser(run: FreeRun, factor: float) -> FreeRun:
 
 
 def halved(run: FreeRun) -> FreeRun:
-    """The run with steps of half the size. Where the forces are smooth, the integration error falls to a
-    sixteenth."""
+    """The run with steps of half the size. Where the forces are smooth, the integration error falls to a sixteenth."""
     return replace(run, max_step=run.max_step / 2)

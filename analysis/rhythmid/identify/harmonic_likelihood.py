@@ -232,8 +232,7 @@ def harmonic_likelihood(
     cycle: bool = True,
     search: bool = False,
 ) -> HarmonicFit:
-    """Estimate the model's free parameters and both delays from one record, also from starting values that are far
-    off.
+    """Estimate the model's free parameters and both delays from one record, also from starting values that are far off.
 
     `model` has no forcing of its own: `pumping` describes it. With `cycle` False the limit cycle is not used as
     data. With `search` True only a start for another fit is computed, from few spectral lines in one pass. Raises
@@ -246,8 +245,7 @@ def harmonic_likelihood(
     comparison = _Comparison(record, plain, pumping, cycle, ring_down)
     if search:
         comparison.thinned(LINES)
-    # while the search is far off, the limit cycle must not outweigh the response; its small harmonics have no
-    # weight yet
+    # while the search is far off, the limit cycle must not outweigh the response; its small harmonics have no weight yet
     exact, response = comparison.cycle_variance, comparison.variance
     size = float(np.abs(comparison.spectra.cycle[1])) if len(comparison.spectra.cycle) > 1 else 1.0
     comparison.cycle_variance = np.full(CYCLE + 1, (0.03 * size) ** 2 + 1e-30)

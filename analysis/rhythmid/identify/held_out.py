@@ -142,8 +142,7 @@ def held_out_runs(
 
 
 def _series(record: Record, model: Model, joint: JointFit | None, block: int) -> list[Series]:
-    """A held-out record, prepared in the same way as the fitted ones, with a zero of its own where they have
-    one."""
+    """A held-out record, prepared in the same way as the fitted ones, with a zero of its own where they have one."""
     series = begun_series(stretches_of((record,)), late_by(model), block)
     if joint is None:
         return series

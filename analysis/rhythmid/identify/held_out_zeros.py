@@ -1,5 +1,4 @@
-"""Detects held-out records whose output is measured from another zero than in the fit. They are reported, not
-corrected.
+"""Detects held-out records whose output is measured from another zero than in the fit. They are reported, not corrected.
 
 Where an encoder was zeroed at another position, a correct model predicts such a record badly. The zero is reported
 where it alone explains nearly all of a large error.

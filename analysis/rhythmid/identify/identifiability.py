@@ -154,8 +154,7 @@ def aliases(joint: JointFit, cycle: bool = True) -> tuple[tuple[float, float], .
 
 
 def stated_by(joint: JointFit) -> Forcing | None:
-    """Where the forcing acts, according to the recordings: a run that describes its forcing generated it on the
-    robot."""
+    """Where the forcing acts, according to the recordings: a run that describes its forcing generated it on the robot."""
     runs_given = [record.run for record in joint.records]
     if runs_given and all(
         run is not None and dict(run.get("forcing") or {}).get("amplitude") for run in runs_given

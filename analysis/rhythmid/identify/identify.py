@@ -71,8 +71,8 @@ def paper_hopper() -> Model:
 def forced_by(model: Model, record: Record) -> tuple[Model, Pumping]:
     """The pumping of a record, and the model without a forcing of its own.
 
-    The record's forcing takes precedence over the model's `periodic_forcing`. Without either the machine is taken
-    as unforced.
+    The record's forcing takes precedence over the model's `periodic_forcing`. Without either the machine is taken as
+    unforced.
     """
     own = [term for term in model.terms if term.element.name == "periodic_forcing"]
     for term in own:
@@ -124,12 +124,12 @@ def identify(
             Prior knowledge of the offset of the forcing's clock [s].
         htf
             Estimator of the harmonic transfer functions of the first record; see `harmonic_transfer_functions`.
-            With `auto` the paper's method uses its own, equation (5).
+            With `auto`
+            the paper's method uses its own, equation (5).
         tell
             Called with a sentence at the start of each step.
         holdout
-            Records for validation only: they are not used in the fit, and the identified model is simulated over
-            them.
+            Records for validation only: they are not used in the fit, and the identified model is simulated over them.
 
     Returns
     -------

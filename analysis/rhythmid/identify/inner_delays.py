@@ -20,8 +20,7 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 OPPOSITE = 0.05  # share of a direction's largest step within which steps count as cancelling
-# share of the delays' largest sensitivity below which the rest of a direction is an error of integration and
-# differences
+# share of the delays' largest sensitivity below which the rest of a direction is an error of integration and differences
 UNNOTICED = 5e-3
 UNKNOWN = Estimate(None, None, "s")
 
@@ -32,8 +31,7 @@ def dead_times(model: Model) -> dict[str, str]:
 
 
 def with_inner_delays(found: Delays, fit: Fit) -> Delays:
-    """The delays with dead times inside the machine added; a delay has no value where only a sum is
-    identifiable."""
+    """The delays with dead times inside the machine added; a delay has no value where only a sum is identifiable."""
     inside = {name: label for name, label in dead_times(fit.model).items() if name in fit.names}
     if not inside:
         return found

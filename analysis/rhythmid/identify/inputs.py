@@ -53,8 +53,7 @@ class Inputs:
 
     @cached_property
     def even_tick(self) -> float:
-        """Usual time [s] between the knots of a held command; infinite without one, or where its times are
-        uneven."""
+        """Usual time [s] between the knots of a held command; infinite without one, or where its times are uneven."""
         command = self.commanded
         if command is None or not is_held(command) or len(command.x) <= SMOOTHED_FROM:
             return np.inf

@@ -1,5 +1,4 @@
-"""Joint maximum likelihood: parameters and both delays together, from the nonlinear model, with the limit cycle as
-data.
+"""Joint maximum likelihood: parameters and both delays together, from the nonlinear model, with the limit cycle as data.
 
 The fit is output error in the time domain on the full simulator. The residuals are whitened, so it is efficient for
 Gaussian noise, and it is free of the distortion that biases a linearised machine. This file adds three things: a
@@ -175,8 +174,7 @@ def explained(fit: Fit, pumping: Pumping | None) -> Search:
 
 
 def _start(model: Model, records: Sequence[Record], pumping: Pumping | None) -> list[Model]:
-    """Models with values from the harmonic likelihood of each record, best first; empty where it cannot be
-    applied."""
+    """Models with values from the harmonic likelihood of each record, best first; empty where it cannot be applied."""
     found: list[tuple[float, Model]] = []
     plain = without_forcing(model)
     for record in sorted(records, key=lambda r: -r.duration)[:3]:

@@ -29,8 +29,7 @@ class JointCovariance:
     names : names of the p parameters, delays included.
     units : unit of each.
     matrix : float64[p, p] covariance in the products of their units. A parameter that is not identifiable has
-    infinity on the
-        diagonal, and NaN in the rest of its row and column.
+        infinity on the diagonal, and NaN in the rest of its row and column.
 
     Examples
     --------

@@ -66,8 +66,7 @@ _DELAYS: TypeAdapter[_Delays] = TypeAdapter(_Delays)
 
 
 def save_latency(found: Identification, path: Path) -> None:
-    """Write the delays and the model of an identification. Raises InputError when the sum of the delays is
-    unknown."""
+    """Write the delays and the model of an identification. Raises InputError when the sum of the delays is unknown."""
     if found.delays.sum.value is None:
         raise InputError(
             "no latency to save: the records show no command, so the sum of the delays is unknown"

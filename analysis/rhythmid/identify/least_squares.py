@@ -26,8 +26,7 @@ def reduced(parts: Iterable[tuple[Array, Array]], most: int = KEPT_ROWS) -> tupl
 
 
 def orthonormal(columns: Array) -> Array:
-    """Orthonormal basis (n, r) of the span of these columns (n, p); linearly dependent and zero columns add
-    nothing."""
+    """Orthonormal basis (n, r) of the span of these columns (n, p); linearly dependent and zero columns add nothing."""
     norms = np.linalg.norm(columns, axis=0)
     if not np.any(norms > 0.0):
         return np.zeros((len(columns), 0))

@@ -1,7 +1,6 @@
 """Physical parameters from the magnitudes of HTFs alone, which delays leave unchanged: the paper's equation (8).
 
-|H_m(jω)| = |G_m(jω)|, so the parameters of the undelayed model can be fitted to |Ĥ_m| before the delays are known.
-The
+|H_m(jω)| = |G_m(jω)|, so the parameters of the undelayed model can be fitted to |Ĥ_m| before the delays are known. The
 model's HTFs pass the same smoothing, equation (5), as the data before the two are compared, so the bias of (5)
 cancels. Parameters that the HTFs do not depend on, such as the rest length, are determined by the mean of the limit
 cycle.
@@ -120,8 +119,7 @@ class _Comparison:
         return np.stack(columns, axis=1)
 
     def rough(self, values: Array) -> float:
-        """Relative misfit of the magnitudes at some of the frequencies, without the smoothing, for a first
-        evaluation."""
+        """Relative misfit of the magnitudes at some of the frequencies, without the smoothing, for a first evaluation."""
         try:
             model = self.linearised(values)
         except InputError:
@@ -149,8 +147,7 @@ def _descend(comparison: _Comparison, start: Array) -> tuple[Array, Array]:
 
 
 def _scan(cost: Callable[[Array], float], start: Array) -> Array:
-    """Best point of a multiplicative grid, one parameter after the other, in two passes over the sensitive
-    parameters."""
+    """Best point of a multiplicative grid, one parameter after the other, in two passes over the sensitive parameters."""
     values, best = start.copy(), cost(start)
     order = list(range(len(values)))
     for _ in range(2):
@@ -195,8 +192,7 @@ def fit_magnitude(estimate: HtfEstimate, model: Model) -> MagnitudeFit:
 
 
 def _covariance(comparison: _Comparison, values: Array, residual: Array) -> Array:
-    """Covariance (p, p) from the scatter of the residual; the smoothing correlates the noise of neighbouring
-    bins."""
+    """Covariance (p, p) from the scatter of the residual; the smoothing correlates the noise of neighbouring bins."""
     jacobian = comparison.jacobian(values)
     norms = np.linalg.norm(jacobian, axis=0)
     dead = norms <= 1e-12 * norms.max(initial=0.0)

@@ -1,5 +1,4 @@
-"""Monte Carlo test of an estimator: new noise for each fit, scatter of the estimates, and coverage of their
-intervals."""
+"""Monte Carlo test of an estimator: new noise for each fit, scatter of the estimates, and coverage of their intervals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -35,8 +34,7 @@ class Scatter:
 
 
 def noisy(record: Record, std: float, seed: int) -> Record:
-    """The record with white noise of standard deviation `std` [output unit] on its output, reproducible by
-    `seed`."""
+    """The record with white noise of standard deviation `std` [output unit] on its output, reproducible by `seed`."""
     output = record.output
     value = output.value + std * np.random.default_rng(seed).standard_normal(len(output))
     return replace(record, output=replace(output, value=value))

@@ -11,8 +11,8 @@ from rhythmid.record.standstill import standstill
 def moving(clean: Sequence[Cleaned]) -> tuple[list[Cleaned], tuple[str, ...]]:
     """The records in which the machine moves, and a note on each record that is left out.
 
-    Noise that may hide a motion is kept and judged by the fit. Raises InputError where the machine stands still in
-    all records.
+    Noise that may hide a motion is kept and judged by the fit. Raises InputError where the machine stands still in all
+    records.
     """
     found = [(one, standstill(one.record, buried=False)) for one in clean]
     kept = [one for one, still in found if still is None]

@@ -99,8 +99,7 @@ def windows(series: Sequence[Series], length: float) -> list[Series]:
 
 
 def forgets(model: Model, series: Sequence[Series]) -> bool:
-    """Whether the effect of a small constant force on the model levels off within the longest stretch of every
-    record.
+    """Whether the effect of a small constant force on the model levels off within the longest stretch of every record.
 
     A displacement that keeps growing means that the machine integrates or is unstable. Then the effect of every
     model error grows, too. The force also shifts the phase of a lightly damped oscillation a little more with every

@@ -132,8 +132,7 @@ def estimate_noise(residuals: Sequence[Array], highest: int = 24, floor: float =
 
 
 def burg(stretches: Sequence[Array], highest: int = 24) -> NoiseModel:
-    """Autoregressive model of stretches (n_i,) by Burg's method; the Bayesian information criterion selects the
-    order.
+    """Autoregressive model of stretches (n_i,) by Burg's method; the Bayesian information criterion selects the order.
 
     For noise that excites a lightly damped machine. Sample covariances treat a stretch as zero beyond its ends,
     which hides such a narrow spectrum. (J. P. Burg, Maximum Entropy Spectral Analysis, thesis, Stanford 1975;

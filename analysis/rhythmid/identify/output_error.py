@@ -173,8 +173,7 @@ def noise_of(residuals: Sequence[Array], series: Sequence[Series], floor: float 
 
 
 def _stretches(residuals: Sequence[Array], series: Sequence[Series]) -> list[Array]:
-    """Residuals of each contiguous run of used averages before whitening: without ignored components, and
-    levelled."""
+    """Residuals of each contiguous run of used averages before whitening: without ignored components, and levelled."""
     stretches = []
     for residual, one in zip(residuals, series):
         if one.ignored is not None:

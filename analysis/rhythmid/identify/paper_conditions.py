@@ -1,5 +1,4 @@
-"""Conditions for harmonic transfer functions and for the paper's method, and which of them a record does not
-meet."""
+"""Conditions for harmonic transfer functions and for the paper's method, and which of them a record does not meet."""
 
 import numpy as np
 

@@ -265,8 +265,7 @@ def _foreign(tried: partial[Trial | None]) -> Trial | None:
 
 
 def _gain_step(fit: Fit) -> float:
-    """Relative change of the input that the residual calls for with the model's values fixed: one least-squares
-    step."""
+    """Relative change of the input that the residual calls for with the model's values fixed: one least-squares step."""
     run = fit.run
     one = run.series[0]
     assert one.command is not None
@@ -328,8 +327,7 @@ def unexplained(search: Search) -> float:
 
 
 def shift(given: Model, fitted: Model) -> float:
-    """Mean |log| of the ratios of a model's free values to the given ones, each limited to a factor of a
-    million."""
+    """Mean |log| of the ratios of a model's free values to the given ones, each limited to a factor of a million."""
     ratios = []
     for name in given.free:
         value = given.parameters[name]

@@ -50,8 +50,7 @@ def repeat_length(series: Series) -> int | None:
 
 
 def noise_from_repeats(series: list[Series], settle: float = 0.4) -> NoiseModel | None:
-    """Noise model from differences between periods; the first `settle` share of each series is left out as
-    transient.
+    """Noise model from differences between periods; the first `settle` share of each series is left out as transient.
 
     None where too few periods repeat.
     """

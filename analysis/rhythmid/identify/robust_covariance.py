@@ -29,8 +29,7 @@ CHANCE = 0.025
 
 
 def widening(columns: Array, residual: Array, records: Sequence[slice], inverse: Array, std: Array) -> Array:
-    """Factors (p,) by which standard deviations must be increased; 1 where the scores of blocks scatter within
-    chance.
+    """Factors (p,) by which standard deviations must be increased; 1 where the scores of blocks scatter within chance.
 
     Parameters
     ----------

@@ -34,8 +34,7 @@ COARSE_ERROR = 0.1
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Whitened residual (n,) and its sensitivities to parameters (n, p), both with the initial states projected
-    out.
+    """Whitened residual (n,) and its sensitivities to parameters (n, p), both with the initial states projected out.
 
     `bases` (one orthonormal basis (n_s, q) per series) span the effects of the initial states. `steps` (p,) and
     `state_steps` (q,) are the finite-difference steps.
@@ -71,8 +70,7 @@ class Problem:
         return self.run.series[index].whitened(self.noise, samples, self.stretches[index])
 
     def whitened(self, index: int, samples: Array) -> Array:
-        """Used stretches of series `index`, whitened and joined, with ignored signals projected out; (n,) or (n,
-        q)."""
+        """Used stretches of series `index`, whitened and joined, with ignored signals projected out; (n,) or (n, q)."""
         white, ignored = self._white(index, samples), self.ignored[index]
         return white if ignored is None else white - ignored @ (ignored.T @ white)
 
@@ -83,8 +81,7 @@ class Problem:
         return [output - one.averaged for output, one in zip(outputs, self.run.series)]
 
     def learn_hidden(self, model: Model, starts: Sequence[Array]) -> None:
-        """Learn the usual range of the elements' own states from a run in which they start as the motion determines
-        them.
+        """Learn the usual range of the elements' own states from a run in which they start as the motion determines them.
 
         The effect of a hidden state of a fast element is almost that of a change of the velocity, so the usual
         range is needed as a prior. A run from the fitted starts would not do: it would accept any start, however
@@ -185,8 +182,7 @@ class Problem:
         state_steps: Array,
         known: Sequence[bool],
     ) -> tuple[Array, Array]:
-        """Finite-difference steps that move the outputs by about the same small amount for every parameter and
-        state.
+        """Finite-difference steps that move the outputs by about the same small amount for every parameter and state.
 
         Natural sizes span many powers of ten (a stiffness, a delay, a hidden state of an actuator). Steps marked
         `known` (p + q) are unchanged.

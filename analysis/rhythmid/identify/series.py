@@ -144,8 +144,7 @@ class Series:
 
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
-        """Weights in δ² of the differences to the previous and to the next block; both 1 where no sample is
-        missing."""
+        """Weights in δ² of the differences to the previous and to the next block; both 1 where no sample is missing."""
         apart = np.diff(self.centres) / (self.block * self.period)
         around = 0.5 * (apart[1:] + apart[:-1])
         return 1.0 / (around * apart[:-1]), 1.0 / (around * apart[1:])
@@ -161,8 +160,8 @@ class Series:
     def smooth(self) -> Pieces | None:
         """The command if it is smooth, or the smooth surrogate of a held one; None where there is none.
 
-        A surrogate is used for a command that is held at even intervals and changes several times in a block, or
-        about as often as the measurement is sampled where samples are averaged.
+        A surrogate is used for a command that is held at even intervals and changes several times in a block, or about as
+        often as the measurement is sampled where samples are averaged.
         """
         if self.command is None or not is_held(self.command):
             return None if self.command is None or not is_smooth(self.command) else self.inputs.command
@@ -273,8 +272,8 @@ def _held_before(time: Array, value: Array) -> tuple[Array, Array]:
 
 
 def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]:
-    """Series of all records. With `block` None the averaging is chosen from the records' bandwidth; samples with
-    uneven timestamps are not averaged.
+    """Series of all records. With `block` None the averaging is chosen from the records' bandwidth; samples with uneven
+    timestamps are not averaged.
 
     Raises InputError for a record that is too short, or with values that are not finite.
     """
@@ -386,8 +385,7 @@ def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Se
 
 
 def dominant_frequency(series: Series, finer: int = 1) -> float:
-    """Frequency [Hz] of the strongest line of the motion, on a grid `finer` times as fine as the record's
-    resolution."""
+    """Frequency [Hz] of the strongest line of the motion, on a grid `finer` times as fine as the record's resolution."""
     value = moving_part(series.averaged)
     value = value - value.mean()
     length = fast_length(finer * len(value))

@@ -27,8 +27,7 @@ class FeltStart:
     Parameters
     ----------
     departure : (h,) deviation of the start from the states' usual mean, in units of their usual scatter.
-    sensitivity : (n, h) of the whitened output to it, with the effects of initial position and velocity projected
-    out.
+    sensitivity : (n, h) of the whitened output to it, with the effects of initial position and velocity projected out.
     """
 
     departure: Array
@@ -62,8 +61,7 @@ def felt_starts(
 
 
 def start_cost(starts: Sequence[FeltStart]) -> float:
-    """Minus twice the logarithm of the ratio of the likelihood averaged over the element states' starts to its
-    maximum.
+    """Minus twice the logarithm of the ratio of the likelihood averaged over the element states' starts to its maximum.
 
     In Laplace's approximation (D. J. C. MacKay, Neural Computation 4 (1992) 415) d'd + ln det(I + H'H) for each series, with its
     departure d and sensitivity H. Zero without such states.

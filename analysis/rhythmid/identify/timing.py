@@ -108,8 +108,7 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
         extended = fit.model.with_element(catalogue[name], {catalogue[name].size: scores[name][0]})
         fit = estimate(extended, fit.run.series, pool=pool, max_step=fit.run.max_step)
         parameter = f"{name}.{catalogue[name].size}"
-        # with standard deviations confirmed by the blocks' scores: missing effects shift a drift more than noise
-        # does
+        # with standard deviations confirmed by the blocks' scores: missing effects shift a drift more than noise does
         value, std = fit.model.value(parameter), with_robust_covariance(fit).std[parameter]
         small = abs(value) * max(float(np.ptp(one.time)) for one in fit.run.series) < 1e-6
         if abs(value) < EVIDENT_BY * std or small or fit.noise.variance > before.noise.variance:
@@ -232,11 +231,9 @@ def _first_samples(fit: Fit, enough: int) -> Fit:
 
 
 def _smear(fit: Fit, largest: float, pool: ThreadPoolExecutor | None) -> tuple[float, float] | None:
-    """Variance [s²] of a delay that is uniform over an interval and so smooths the command; and its standard
-    deviation.
+    """Variance [s²] of a delay that is uniform over an interval and so smooths the command; and its standard deviation.
 
-    The profile likelihood over the variance is approximated by a parabola. None where the response does not roll
-    off.
+    The profile likelihood over the variance is approximated by a parabola. None where the response does not roll off.
     """
     fit = _first_samples(fit, ROLL_OFF_SAMPLES)
     at = np.linspace(0.0, largest, SMEARS + 1) ** 2
@@ -266,8 +263,7 @@ def _widened(fit: Fit, name: str, std: float) -> Fit:
 
 
 def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tuple[JointFit, Estimate]:
-    """Search for a drive that takes commands at a slower rate of its own: the fit with it, and its period P [s] or
-    None.
+    """Search for a drive that takes commands at a slower rate of its own: the fit with it, and its period P [s] or None.
 
     Averaged over the ticks, the drive smooths a held command over P. The roll-off determines P, and half of P is
     delay of the hold. Where the machine responds to single ticks, only a period that stays in step over the whole

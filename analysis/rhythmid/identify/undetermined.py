@@ -17,8 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Direction:
-    """A change of parameters (unit vector, in units of their sizes) to which the records are insensitive, in
-    words."""
+    """A change of parameters (unit vector, in units of their sizes) to which the records are insensitive, in words."""
 
     names: tuple[str, ...]
     weights: Array
@@ -28,8 +27,7 @@ class Direction:
 def undetermined(fit: Fit) -> list[Direction]:
     """Directions in parameter space whose standard deviation exceeds the sizes of the parameters.
 
-    They are the null space of the Fisher information, with each parameter scaled by its natural size: see
-    `natural_size`.
+    They are the null space of the Fisher information, with each parameter scaled by its natural size: see `natural_size`.
     """
     p = len(fit.names)
     if p == 0:

@@ -19,14 +19,12 @@ from rhythmid.identify.robust_covariance import with_robust_covariance
 
 
 def efficient_fit(fit: Fit) -> Fit:
-    """The fit with standard deviations confirmed by its blocks' scores, or the ordinary one where that scatters
-    less.
+    """The fit with standard deviations confirmed by its blocks' scores, or the ordinary one where that scatters less.
 
     Parameters
     ----------
     fit : weighted by the noise model of its residuals. An ordinary fit is made only where the scores of its blocks
-    scatter by
-        more than those of noise.
+        scatter by more than those of noise.
     """
     weighted = with_robust_covariance(fit)
     if fit.noise.order == 0 or np.array_equal(weighted.covariance, fit.covariance):

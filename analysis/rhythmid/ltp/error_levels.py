@@ -36,8 +36,8 @@ def local_level(power: Array, where: Mask, count: int) -> Level:
 
 @dataclass(frozen=True, eq=False)
 class ErrorLevels:
-    """Levels measured in empty bins: noise, distortion of even and odd order (NaN where they cannot be separated),
-    and `higher`, the squared size of HTFs beyond those estimated [(output unit / input unit)²]."""
+    """Levels measured in empty bins: noise, distortion of even and odd order (NaN where they cannot be separated), and
+    `higher`, the squared size of HTFs beyond those estimated [(output unit / input unit)²]."""
 
     noise: Level
     even: Array

@@ -47,8 +47,7 @@ class HarmonicEstimate:
 
     @property
     def radius(self) -> Array:
-        """Radius of the disk about the value that contains the true value with 95 %: |ΔH|² ≤ std² F.95(2, 2
-        freedom)."""
+        """Radius of the disk about the value that contains the true value with 95 %: |ΔH|² ≤ std² F.95(2, 2 freedom)."""
         return self.std * np.sqrt(f_distribution.ppf(0.95, 2.0, 2.0 * self.freedom))
 
 

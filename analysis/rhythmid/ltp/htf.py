@@ -1,5 +1,4 @@
-"""Harmonic transfer functions (HTFs): the response at other frequencies to an input at one, from a model or from
-data.
+"""Harmonic transfer functions (HTFs): the response at other frequencies to an input at one, from a model or from data.
 
 Convention of the paper's equation (4), used throughout: Y(jω) = Σ_m G_m(jω) U(j(ω − mω_p)), with ω the output's frequency.
 A real system has G_−m(−jω) = conj G_m(jω).

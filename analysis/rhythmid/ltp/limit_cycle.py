@@ -66,8 +66,7 @@ class LimitCycle:
     Attributes
     ----------
     time : float64[n + 1] from 0 to T [s], both ends included.
-    states, rates : float64[n + 1, q] state vector and its derivative; memory states as they were `MAX_STEP`
-    earlier.
+    states, rates : float64[n + 1, q] state vector and its derivative; memory states as they were `MAX_STEP` earlier.
     output : float64[n + 1] sensor output.
     monodromy : float64[q, q] Jacobian of the period map; its eigenvalues are the Floquet multipliers.
     closure : distance between the state's two ends, relative to its motion.

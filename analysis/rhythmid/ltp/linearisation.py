@@ -194,8 +194,8 @@ def _impulse(jacobian: _Jacobian, time: float) -> Impulse | None:
 def linearise(cycle: LimitCycle, effort: float | None = None) -> Linearisation:
     """Linearise a model around its limit cycle; equation (1), and for the paper's plant (11)-(13).
 
-    `effort` [N] is the size of a perturbing command, which scales the difference steps; with None it is the size of
-    the forcing, or 1.
+    `effort` [N] is the size of a perturbing command, which scales the difference steps; with None it is the size of the
+    forcing, or 1.
     """
     if effort is None:
         effort = float(np.abs(cycle.pumping.coefficients[1:]).max(initial=0.0)) or 1.0

@@ -1,5 +1,4 @@
-"""Harmonic transfer functions without a model: selects the method for the excitation and the number of
-harmonics."""
+"""Harmonic transfer functions without a model: selects the method for the excitation and the number of harmonics."""
 
 from typing import Literal
 
@@ -33,9 +32,8 @@ def harmonic_transfer_functions(
     ----------
     ring_down : time constant [s] of the machine's slowest motion, approximately; it gives the width of a resonance.
     method : `separated_lines` needs a periodic excitation whose harmonics fall into separate bins; `local_rational`
-    a dense
-        one; `regularised_least_squares` is the paper's equation (5), which smooths. `auto` takes the first of them
-        that the excitation allows.
+        a dense one; `regularised_least_squares` is the paper's equation (5), which smooths. `auto` takes the first
+        of them that the excitation allows.
     harmonics : M; None chooses the largest significant one, with probability `false_alarm` of too many.
 
     Raises InputError when the record has no excitation, or does not allow the `method` or so many `harmonics`.

@@ -1,5 +1,4 @@
-"""Number of significant harmonics: a test of |Ĥ_m|² against its own variance, with a stated rate of false
-alarms."""
+"""Number of significant harmonics: a test of |Ĥ_m|² against its own variance, with a stated rate of false alarms."""
 
 from collections.abc import Sequence
 

@@ -25,8 +25,8 @@ GRID = 1024
 class Pumping:
     """Periodic forcing f0(t) = Re Σ_h F_h exp(j h ω_p (t − origin)), h = 0, 1, …, in the record's time t [s].
 
-    `coefficients` complex128[H + 1] [N] with F_1 real and nonnegative by choice of the `origin` [s]. `frequency`
-    [Hz] is 1/T; `source` names its origin. Without forcing all coefficients are zero.
+    `coefficients` complex128[H + 1] [N] with F_1 real and nonnegative by choice of the `origin` [s]. `frequency` [Hz]
+    is 1/T; `source` names its origin. Without forcing all coefficients are zero.
     """
 
     frequency: float

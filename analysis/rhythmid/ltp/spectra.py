@@ -1,5 +1,4 @@
-"""Spectra of a record over a whole number of pumping periods, without the warm-up, and with the limit cycle
-separated.
+"""Spectra of a record over a whole number of pumping periods, without the warm-up, and with the limit cycle separated.
 
 Over a window of P periods the limit cycle occupies the bins nP only. If the command before the window repeats at
 the window's end (chirps in a cycle, a multisine, or silence), the response is periodic, too, and there is no

@@ -61,8 +61,7 @@ def turn_of(record: Record) -> float:
 
 
 def wraps_by(value: Array, turn: float) -> NDArray[np.intp]:
-    """Indices (m,) of the steps of the values (n,) that are jumps by a turn; empty where any jump is something
-    else.
+    """Indices (m,) of the steps of the values (n,) that are jumps by a turn; empty where any jump is something else.
 
     A jump is a turn minus the motion during the step. That motion is no larger than in other steps, and it goes in
     the direction opposite to the jump.

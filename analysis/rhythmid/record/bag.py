@@ -33,8 +33,7 @@ class Bag:
     topics : all topics by name, with or without messages.
     truncated : whether the recording ends abruptly (its recorder was killed or is still running).
     notes : messages about the state of the files, one line each; empty for a complete recording.
-    stated : number of messages by topic, from metadata.yaml or the end of the files; empty where they do not state
-    it.
+    stated : number of messages by topic, from metadata.yaml or the end of the files; empty where they do not state it.
 
     With `verify` the checksums of the files are compared. Raises InputError when there is no such recording.
     """

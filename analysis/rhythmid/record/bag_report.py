@@ -34,8 +34,7 @@ MEGABYTE = 1e6  # bytes; smaller sizes are given in kB
 
 @dataclass(frozen=True)
 class TopicReport:
-    """One topic: its type, the timing of its receive times and of its header stamps, and receive time minus stamp
-    [s]."""
+    """One topic: its type, the timing of its receive times and of its header stamps, and receive time minus stamp [s]."""
 
     name: str
     type: str

@@ -41,8 +41,7 @@ FOREVER = QosTime(9223372036, 854775807)  # rosbag2's notation of an infinite du
 class BagWriter(Writer):
     """rosbags' Writer, extended by storages that accept arrays and by files that can be split.
 
-    `numbered` names the files as rosbag2's recorder does (`bag_0.mcap`, …); without it there is one file,
-    `bag.mcap`.
+    `numbered` names the files as rosbag2's recorder does (`bag_0.mcap`, …); without it there is one file, `bag.mcap`.
     `ros_distro` is the ROS distribution that metadata.yaml names.
     """
 

@@ -67,8 +67,7 @@ def _running_apart(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, 
 
 
 def _rate(channel: ChannelQuality, clock: str | None) -> tuple[float, float] | None:
-    """Rate [s/s] by which a channel's times run faster than the receiver's clock, with its standard deviation
-    [s/s]."""
+    """Rate [s/s] by which a channel's times run faster than the receiver's clock, with its standard deviation [s/s]."""
     if clock == "receive":
         return 0.0, 0.0
     return None if channel.skew is None or channel.skew_std is None else (channel.skew, channel.skew_std)

@@ -20,8 +20,7 @@ def is_trace(lines: Iterable[str]) -> bool:
 
 
 def read_trace(lines: Iterable[str]) -> dict[str, NDArray[np.float64]]:
-    """The times of all samples, in order, and the variables by name; float64[n] each, NaN where a variable has no
-    sample.
+    """The times of all samples, in order, and the variables by name; float64[n] each, NaN where a variable has no sample.
 
     Raises ValueError where a line with samples is damaged.
     """

@@ -30,8 +30,8 @@ def compress(data: bytes) -> bytes:
 def decompress(data: bytes, method: str) -> bytes:
     """Decompress a chunk; `method` as MCAP names it: '' (none), 'zstd' or 'lz4'.
 
-    A truncated frame gives the data before its end. Raises ValueError when `data` is no such frame, or holds more
-    than `largest` allows.
+    A truncated frame gives the data before its end. Raises ValueError when `data` is no such frame, or holds more than
+    `largest` allows.
     """
     if method == "":
         return data

@@ -1,5 +1,4 @@
-"""Records of one machine whose positions are far apart, for example because an encoder was zeroed at another
-position."""
+"""Records of one machine whose positions are far apart, for example because an encoder was zeroed at another position."""
 
 from collections.abc import Sequence
 

@@ -1,5 +1,4 @@
-"""Several runs in one file, each in its own struct or group: `runs[0].q` and `runs[1].q`, `trial1.q` and
-`trial2.q`."""
+"""Several runs in one file, each in its own struct or group: `runs[0].q` and `runs[1].q`, `trial1.q` and `trial2.q`."""
 
 import re
 from collections.abc import Mapping
@@ -22,8 +21,7 @@ TIME = re.compile(r"(?:.*[._ ])?(?:time|timestamp|stamp|t)(?:[._ ]?(?:s|ms|us|ns
 
 @dataclass(frozen=True)
 class Runs:
-    """Runs by path, such as `runs[0]`, in the order of the file; the arrays of each by their names within the
-    run."""
+    """Runs by path, such as `runs[0]`, in the order of the file; the arrays of each by their names within the run."""
 
     members: Mapping[str, Mapping[str, Any]]
 

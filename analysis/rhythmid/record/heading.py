@@ -37,8 +37,7 @@ LETTERS = {  # a single letter is a unit only after a suitable word: pos_a is no
     "s": "t time timestamp stamp elapsed", "m": "pos position x y z height displacement disp length travel stroke",
     "n": "f force load thrust", "a": "i iq current cur", "v": "u voltage volt supply",
 }  # fmt: skip
-# units that may follow a name directly, with the names that they suit: "yrad" has one; "grad" and "thread" are
-# words
+# units that may follow a name directly, with the names that they suit: "yrad" has one; "grad" and "thread" are words
 GLUED = {
     "deg rad mrad": "x y q ang angle pos position theta phi psi alpha beta gamma roll pitch yaw tilt enc encoder",
     "mm": "x y z pos position height disp displacement dist distance length travel stroke",

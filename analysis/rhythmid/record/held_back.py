@@ -25,15 +25,13 @@ MINIMA = 64  # parts of a recording; only the earliest sample of each can touch 
 # parts of a recording whose earliest samples are compared: a lost sample shifts all later ones, a busy network
 # delays only some
 PARTS = 8
-# periods by which the earliest samples may be late: one lost sample gives 0.8, bursts of 4 to 6 samples alone up to
-# 0.4
+# periods by which the earliest samples may be late: one lost sample gives 0.8, bursts of 4 to 6 samples alone up to 0.4
 STEADY = 0.5
 LEAST_SAMPLES_IN_BURSTS = 200  # so that each part has several bursts
 
 
 def evened(channels: Mapping[str, Channel]) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """The channels with the sampling times of samples that arrived in bursts, and a note where there are such
-    samples.
+    """The channels with the sampling times of samples that arrived in bursts, and a note where there are such samples.
 
     Channels with the same times are treated together. A channel with missing samples keeps its times.
     """

@@ -1,5 +1,4 @@
-"""Hold of a command between samples: an event-based command holds its value; a measured signal changes between
-samples.
+"""Hold of a command between samples: an event-based command holds its value; a measured signal changes between samples.
 
 Where samples do not resolve the signal, neither straight lines nor a band-limited curve give its values between
 them. The samples show whether they resolve it: then a line through a sample's neighbours is closer to it than the

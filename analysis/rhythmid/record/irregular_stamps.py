@@ -15,8 +15,7 @@ COMMON = 0.01  # share of long steps up to which they are single gaps of any len
 # samples; above FAR jitter of less than 0.3 periods cannot cause it (times without a period give a quarter)
 # beyond FAR jitter of less than 0.3 periods does not (a quarter is what times without any period give)
 NEAR, FAR = 0.1, 0.2
-# ratio of this distance to that of the other steps from one period, used between NEAR and FAR: jitter affects both
-# alike
+# ratio of this distance to that of the other steps from one period, used between NEAR and FAR: jitter affects both alike
 FARTHER = 2.0
 # in periods: the mean step cannot be shorter, as losses lengthen it and jitter does not change it
 SHORTER = 0.9

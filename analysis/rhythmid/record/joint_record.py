@@ -42,8 +42,8 @@ SHARED = ("topic", "file", "time")  # keys that a channel takes from the output 
 class JointSignals:
     """Content of a signals.yaml with `joints:`, as signals of each single joint.
 
-    `base` holds the signals of the base's joint. `sampled` says whether an effort is the mean over a sample period
-    or instantaneous, where that is declared.
+    `base` holds the signals of the base's joint. `sampled` says whether an effort is the mean over a sample period or
+    instantaneous, where that is declared.
     """
 
     joints: Mapping[str, Signals]

@@ -27,11 +27,10 @@ def judged(
     Parameters
     ----------
     source : origin of the channel.
-    recorded, lateness : (m,) times [s] in the order of recording, and receive time minus stamp [s]; None without
-    stamps.
+    recorded, lateness : (m,) times [s] in the order of recording, and receive time minus stamp [s]; None without stamps.
     time, value : (n,) times [s] in order, without duplicates, and values; NaN where one is missing.
     stamped : whether it is the output with its own stamps, whose jitter the samples show; a declared rate gives no
-    stamps.
+        stamps.
     missing, conflicts : messages without the channel's entry, and duplicates with different values.
     """
     told = np.isfinite(value)  # infinite values are rejected where they are used

@@ -1,5 +1,4 @@
-"""Logs with a label for each number in every row: `Time: 5001 Position: 594 Current: 511`, as printed for a
-user."""
+"""Logs with a label for each number in every row: `Time: 5001 Position: 594 Current: 511`, as printed for a user."""
 
 import re
 from collections import Counter
@@ -13,8 +12,7 @@ from rhythmid.record.heading import is_unit
 from rhythmid.record.text_cells import content
 from rhythmid.record.text_rows import SHOWN
 
-# a label that begins with a letter, a colon or an equals sign, a number, and directly or separately after it the
-# unit
+# a label that begins with a letter, a colon or an equals sign, a number, and directly or separately after it the unit
 PAIR = re.compile(
     r"[\s,;|]*(?P<label>[^\W\d][^:=,;|\t]*?)\s*[:=]\s*"
     r"(?P<number>[-+]?(?:\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?|nan|inf))(?P<glued>[^\s,;|\d:=]*)"
@@ -35,8 +33,7 @@ class Labelled:
 
 
 def labels_of(begin: Sequence[str]) -> tuple[str, ...] | None:
-    """The labels that most of these lines have, with the units after the numbers; None where most lines have
-    none."""
+    """The labels that most of these lines have, with the units after the numbers; None where most lines have none."""
     lines = [line for line in begin if content(line)]
     found = Counter(tuple(name for name, _ in pairs) for line in lines if (pairs := pairs_of(line)))
     labels, count = found.most_common(1)[0] if found else ((), 0)

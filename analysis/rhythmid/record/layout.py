@@ -57,8 +57,7 @@ class Text:
 
 
 class Layout:
-    """Layout of one little-endian CDR message. `root` maps field names to their contents, nested as the message
-    is."""
+    """Layout of one little-endian CDR message. `root` maps field names to their contents, nested as the message is."""
 
     def __init__(self, message: bytes, msgtype: str, types: TypeFields) -> None:
         if len(message) < HEAD or int.from_bytes(message[:2], "little") != LITTLE_ENDIAN:
@@ -188,8 +187,7 @@ def _position(name: str, above: list[dict[str, Any]], entries: Any) -> tuple[int
 
 
 def value_of(message: Any, field: Field) -> float:
-    """The number at the path `field` in a deserialised message. Raises LookupError with the reason if there is
-    none."""
+    """The number at the path `field` in a deserialised message. Raises LookupError with the reason if there is none."""
     here = message
     above: list[Any] = []
     done = ""

@@ -8,8 +8,7 @@ FIRST_LINE = b"version https://git-lfs.github.com/spec/"
 
 
 def check_content(path: Path) -> None:
-    """Raise InputError where a file is only a pointer to data. A file that cannot be opened is left to its
-    reader."""
+    """Raise InputError where a file is only a pointer to data. A file that cannot be opened is left to its reader."""
     try:
         with path.open("rb") as file:
             start = file.read(len(FIRST_LINE))

@@ -27,8 +27,7 @@ def list_of(cell: str) -> list[float] | None:
 
 
 def lists_of(cells: Sequence[str], rows: Rows, column: int) -> NDArray[np.float64] | None:
-    """The lists of a column, float64[n, k], NaN where a cell is empty; None where the first filled cell holds no
-    list.
+    """The lists of a column, float64[n, k], NaN where a cell is empty; None where the first filled cell holds no list.
 
     Raises ValueError where another row has another number of values, or no list.
     """

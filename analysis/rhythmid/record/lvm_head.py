@@ -16,8 +16,7 @@ TIME, REMARK = "X_Value", "Comment"  # names of the columns before and after the
 
 @dataclass(frozen=True)
 class LvmHead:
-    """Number of header lines, the units of the channels (empty where none are given), and the times by start and
-    step.
+    """Number of header lines, the units of the channels (empty where none are given), and the times by start and step.
 
     `step` is 0 where each row states its time, in a column before the channels.
     """
@@ -28,8 +27,7 @@ class LvmHead:
     step: float = 0.0
 
     def names(self, head: Sequence[str], count: int) -> list[str]:
-        """The names of `count` columns, without the remark column where rows end before it, and the units of
-        all."""
+        """The names of `count` columns, without the remark column where rows end before it, and the units of all."""
         kept = list(head[:-1] if len(head) == count + 1 and head[-1] in ("", REMARK) else head)
         if not kept or kept[0] not in ("", TIME):
             return kept

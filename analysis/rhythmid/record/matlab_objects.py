@@ -12,8 +12,7 @@ WRITTEN_BY = {
 
 
 def complaint_of_objects(objects: Mapping[str, str]) -> str:
-    """Reason why a file with nothing but objects, given as their classes by name, holds no table, and what to
-    do."""
+    """Reason why a file with nothing but objects, given as their classes by name, holds no table, and what to do."""
     name, kind = next(iter(objects.items()))
     written = WRITTEN_BY.get(kind, "").format(name=name)
     mend = f"in MATLAB  {written}" if written else "in MATLAB save its numbers as arrays"

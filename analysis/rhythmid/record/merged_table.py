@@ -29,8 +29,7 @@ def is_merged(columns: Iterable[Array]) -> bool:
 
 
 def is_sampled_rarely(value: Array) -> bool:
-    """Whether a column (n,) is empty in most rows, but never for long: a stream that is slower than the table's
-    rows."""
+    """Whether a column (n,) is empty in most rows, but never for long: a stream that is slower than the table's rows."""
     there = np.flatnonzero(~np.isnan(value))
     if not 0 < len(there) <= TOGETHER * len(value):
         return False

@@ -122,8 +122,7 @@ def typestore(topic: Topic) -> Any:
 
 
 def stamp_path(topic: Topic) -> str | None:
-    """Path of the timestamp in the topic's messages: in the header, else in the message itself; None if there is
-    none."""
+    """Path of the timestamp in the topic's messages: in the header, else in the message itself; None if there is none."""
     types = type_fields(topic)
     time = (Nodetype.NAME, "builtin_interfaces/msg/Time")
     fields = dict(types[topic.type][1])

@@ -50,8 +50,7 @@ def bag_information(
     ros_distro: str,
     custom_data: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
-    """Content of metadata.yaml below its top-level key; `ros_distro` is the ROS distribution of the message
-    types."""
+    """Content of metadata.yaml below its top-level key; `ros_distro` is the ROS distribution of the message types."""
     total = FileContent("")
     for file in files:
         for number, count in file.counts.items():

@@ -34,8 +34,7 @@ Mask = NDArray[np.bool_]
 
 
 def outlying_samples(value: Array) -> Mask:
-    """Whether samples (n,) are far from the line through the samples before and after them, for at most three in a
-    row.
+    """Whether samples (n,) are far from the line through the samples before and after them, for at most three in a row.
 
     Two good samples are needed on either side; at an end of the record the outer one may be missing. A kink in the
     signal, such as an impact, changes the slope and is no outlier. Values that occur too often are none, either.

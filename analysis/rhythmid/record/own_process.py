@@ -1,5 +1,4 @@
-"""Reads arrays in a separate process, for compiled readers that trust their file: a damaged file may kill the
-process."""
+"""Reads arrays in a separate process, for compiled readers that trust their file: a damaged file may kill the process."""
 
 import faulthandler
 import os

@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-# share of late messages above which they are reported: the 99th percentile of the lateness then exceeds a sample
-# period
+# share of late messages above which they are reported: the 99th percentile of the lateness then exceeds a sample period
 NOTABLE = 0.01
 # stages that messages pass; where the command path holds messages until they are due, a late sender does not matter
 _PATHS = {"commands": ("command_delay", "plant"), "measurements": ("measurement_delay",)}
@@ -18,8 +17,8 @@ def punctuality_notes(run: Mapping[str, Any] | None) -> tuple[str, ...]:
     Parameters
     ----------
     run : content of the topic `run`. `timing` has for each real-time stage of the path how many of its messages
-    (`of`) were more
-        than a sample period `late`, the longest delay of one [s] (`max`), and how many were `lost`.
+        (`of`) were more than a sample period `late`, the longest delay of one [s] (`max`), and how many were
+        `lost`.
     """
     timing = (run or {}).get("timing")
     if not isinstance(timing, Mapping):

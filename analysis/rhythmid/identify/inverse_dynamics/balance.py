@@ -1,5 +1,4 @@
-"""The effort balance: the effort that the motor must have given along the measured motion, if the model were
-correct.
+"""The effort balance: the effort that the motor must have given along the measured motion, if the model were correct.
 
 u = m a − ΣF, with every element's force F and its states computed along the measured motion. The recorded effort is
 only the quantity to predict; it is never a regressor. Forces under load and the actuator use the effort that the
@@ -199,8 +198,7 @@ class Balance:
         return rows + self.rows(changes) if changes else rows
 
     def _asked(self, index: int, model: Model, late: float) -> Array:
-        """Force (n,) commanded by the controller due to its reference. Cached: most refits keep the command
-        path."""
+        """Force (n,) commanded by the controller due to its reference. Cached: most refits keep the command path."""
         key = (index, "asked", changed_by(model), late)
         found = self._forces.get(key)
         if found is None:

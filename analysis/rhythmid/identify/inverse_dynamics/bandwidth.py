@@ -44,8 +44,7 @@ class Bandwidth:
 
 
 def bandwidth_of_motion(raw: Sequence[Stretch]) -> tuple[float, float]:
-    """Highest frequency [Hz] at which the motion of these stretches is measured, and its strongest frequency
-    [Hz]."""
+    """Highest frequency [Hz] at which the motion of these stretches is measured, and its strongest frequency [Hz]."""
     limits, lines, weights = [], [], []
     for one in raw:
         limit, line = _of_motion(one)

@@ -209,8 +209,7 @@ def fit_effort(
 
 
 def _divides(model: Model, name: str) -> bool:
-    """Whether a parameter cannot be 0: the inertia, or a motor constant (the gain from signal to force, or its
-    limit)."""
+    """Whether a parameter cannot be 0: the inertia, or a motor constant (the gain from signal to force, or its limit)."""
     term = model.term(name.split(".")[0])
     return name == INERTIA or (term is not None and term.element.acts == "transducer")  # pyright: ignore[reportUnnecessaryComparison]
 
@@ -219,8 +218,7 @@ def _step(
     residual: Array, jacobian: Array, precision: Array, value: Array, mean: Array, low: Array, high: Array,
     scale: float,
 ) -> Array:  # fmt: skip
-    """Gauss-Newton step (p,). A component that would leave its bounds is fixed there, and the others are solved
-    again."""
+    """Gauss-Newton step (p,). A component that would leave its bounds is fixed there, and the others are solved again."""
     weight = weights_of(residual, scale) / scale**2
     normal = (jacobian * weight[:, None]).T @ jacobian + np.diag(precision)
     slope = jacobian.T @ (weight * residual) + precision * (value - mean)

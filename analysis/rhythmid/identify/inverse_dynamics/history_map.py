@@ -1,5 +1,4 @@
-"""A free function of the motion and its past, for effects that no sum of curves over single quantities can
-represent.
+"""A free function of the motion and its past, for effects that no sum of curves over single quantities can represent.
 
 The force at a joint depends on several quantities at once. With play and hysteresis it depends on the last turning
 points, too. The function is a Gaussian process of position, velocity, acceleration, load, and the states of stop
@@ -22,8 +21,7 @@ Array = NDArray[np.float64]
 # widths of the stops, in standard deviations of the position: presliding, play, a soft transmission
 WIDTHS = (0.02, 0.1, 0.4)
 CENTRES = 80  # a record has some hundred rows: about as many as its columns can distinguish
-# length scale of the function, in standard deviations of each quantity: 1.5 to 3 were best for large and small
-# residuals
+# length scale of the function, in standard deviations of each quantity: 1.5 to 3 were best for large and small residuals
 LENGTH = 2.0
 # added to the diagonal of the kernel matrix of the centres, for conditioning when centres are close
 JITTER = 1e-6

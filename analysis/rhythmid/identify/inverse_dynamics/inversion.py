@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 MOST_INVERSION_STEPS = 12  # most iterations: an error that halves each time is then below a thousandth
-# largest share of the error that a correction may leave: a rate limit, which cannot be inverted, leaves nearly all
-# of it
+# largest share of the error that a correction may leave: a rate limit, which cannot be inverted, leaves nearly all of it
 SETTLING = 0.5
 # share of the error after a step below which the previous slopes are reused: new ones cost two evaluations
 FAST = 0.1

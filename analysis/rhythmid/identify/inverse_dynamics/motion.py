@@ -105,8 +105,7 @@ class Stretch:
 
 
 def effort_channel(record: Record, model: Model) -> Channel | None:
-    """The channel with the effort: the recorded motor effort, else the commanded force; None where there is
-    neither."""
+    """The channel with the effort: the recorded motor effort, else the commanded force; None where there is neither."""
     if record.effort is not None:
         return record.effort
     if record.input is not None and record.input_kind == "force" and not controlled(model):
@@ -205,8 +204,7 @@ def _sections(order: int, cut: float, kind: str) -> Array:
 
 
 def low_pass(values: Array, period: float, frequency: float) -> Array:
-    """Values (n,) or (n, p) after a low-pass Butterworth filter of cut-off `frequency` [Hz], run in both
-    directions."""
+    """Values (n,) or (n, p) after a low-pass Butterworth filter of cut-off `frequency` [Hz], run in both directions."""
     if frequency * period >= 0.45:
         return values
     sections = _sections(ORDER, 2.0 * frequency * period, "lowpass")
@@ -227,9 +225,8 @@ def high_pass(values: Array, period: float, frequency: float) -> Array:
 def motion_of(stretch: Stretch, model: Model, frequency: float, low: float = 0.0) -> Motion:
     """The motion of one stretch below `frequency` [Hz], on a grid as coarse as that allows.
 
-    The effect of the model's sensor elements is removed to first order. A velocity is integrated to a position of
-    mean zero. An acceleration is integrated to a motion above `low` [Hz]: below, the accelerometer's drift would
-    dominate.
+    The effect of the model's sensor elements is removed to first order. A velocity is integrated to a position of mean
+    zero. An acceleration is integrated to a motion above `low` [Hz]: below, the accelerometer's drift would dominate.
     """
     time, period = stretch.time, stretch.period
     coarser = max(1, int(1.0 / (FINER * frequency * period)))

@@ -6,8 +6,7 @@ TOLD = 0.1
 
 
 def told(share: float) -> str | None:
-    """Message that the machine is at rest, or close to it, in a share of the samples; None where this share is
-    small."""
+    """Message that the machine is at rest, or close to it, in a share of the samples; None where this share is small."""
     if share < TOLD:
         return None
     return f"{share:.0%} of the samples are in or beside rests, at which friction balances any effort: they are left out"

@@ -106,8 +106,7 @@ def _without(values: Array, nuisance: Array) -> Array:
 
 
 def _sizes(inertial: Array) -> Array:
-    """Scales of a link's parameters: its mass, and the mass times its radius of gyration and times the square of
-    that."""
+    """Scales of a link's parameters: its mass, and the mass times its radius of gyration and times the square of that."""
     mass = inertial[0]
     radius = np.sqrt(max(float(inertial[4:7].sum()) / (2.0 * mass), 1e-12))
     return mass * np.array([1.0, *(radius,) * 3, *(radius**2,) * 6])

@@ -111,8 +111,7 @@ def _periods(balances: JointBalances) -> dict[str, float]:
 
 
 def _errors(balances: JointBalances, joint: str, half: float, tried: np.ndarray) -> np.ndarray:
-    """Effort error of a joint's fitted nominal path for each lead, to first order in the lead and the
-    parameters."""
+    """Effort error of a joint's fitted nominal path for each lead, to first order in the lead and the parameters."""
     balance, model = balances.balance(joint), balances.models[joint]
     residual, columns = linearise(balance, model, balance.estimated(model), 0.0)
     moved = balances.with_leads({joint: half}).balance(joint)

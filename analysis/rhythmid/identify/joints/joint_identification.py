@@ -47,8 +47,7 @@ if TYPE_CHECKING:
 WORSE = 1.1  # ratio of free-run errors, identified over given values, above which a warning is given
 # share of the motion by which the error also has to grow: free runs of a correct model scatter by more
 MUCH = 0.005
-# standard deviations by inverse dynamics that a parameter may move in free runs: it also contains errors of the
-# filter
+# standard deviations by inverse dynamics that a parameter may move in free runs: it also contains errors of the filter
 LOOSE = 5.0
 RELATIVE = 0.3  # share of its value by which a parameter may move at least
 # free-run error of a correct model as a share of the motion (measured: machines in the air 1 to 3 %)
@@ -236,8 +235,7 @@ def worse_joints(runs: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
 
 
 def poor_joints(efforts: Mapping[str, float], motions: Mapping[str, float] | None) -> tuple[str, ...]:
-    """The joints with more than `POOR_MOTION` unexplained: of the effort, and of the free-run motion where there is
-    one.
+    """The joints with more than `POOR_MOTION` unexplained: of the effort, and of the free-run motion where there is one.
 
     One of the two is enough for an identification. Without a controller even the correct machine drifts from the
     recorded motion, because small errors of its effort add up. Where a reference drives the joint, its effort may

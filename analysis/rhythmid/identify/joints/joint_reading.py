@@ -1,5 +1,4 @@
-"""Readings of recorded joints (their order, units and signs), and the effort residuals that a body leaves under
-each.
+"""Readings of recorded joints (their order, units and signs), and the effort residuals that a body leaves under each.
 
 The dynamics of a body are sensitive to a wrong reading: gravity depends on the angles, and the motion of one joint
 acts on the others. So the force of the file's body is computed along the motion under a reading. Each joint's
@@ -205,8 +204,7 @@ def _effort(model: Model, joint: str, stretch: JointStretch, place: int) -> Arra
 
 
 def _near(length: int, period: float, cut: float) -> tuple[NDArray[np.intp], ...]:
-    """For each sample of a stretch, the indices of itself and of samples within the filter's length on either
-    side."""
+    """For each sample of a stretch, the indices of itself and of samples within the filter's length on either side."""
     reach = math.ceil(CLEAR / (cut * period))
     steps = np.unique(np.linspace(-reach, reach, NEIGHBOURS).astype(int))
     return tuple(np.clip(np.arange(length) + step, 0, length - 1) for step in steps)

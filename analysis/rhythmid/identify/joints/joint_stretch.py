@@ -1,5 +1,4 @@
-"""Recorded data of a machine with several joints, in stretches without gaps and contact, on one grid for all
-joints."""
+"""Recorded data of a machine with several joints, in stretches without gaps and contact, on one grid for all joints."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

@@ -98,8 +98,7 @@ def errors_of(machine: Machine, balances: JointBalances, records: Sequence[Joint
 def _runs(
     machine: Machine, balances: JointBalances, records: Sequence[JointRecord]
 ) -> list[tuple[Array, str]]:
-    """For each stretch the free-run errors (n, joints) as shares of the joints' motion, and in words why it
-    diverged."""
+    """For each stretch the free-run errors (n, joints) as shares of the joints' motion, and in words why it diverged."""
     sizes = _sizes(balances, machine)
     drives = [commands(machine, record) for record in records]
     worker = machine.body.worker()
@@ -195,8 +194,7 @@ def _repeats(balances: JointBalances) -> float:
 
 
 def _together(machine: Machine, names: Sequence[str]) -> list[list[tuple[int, list[int]]]]:
-    """Groups of parameters of different limbs, each with its index and the indices of the joints that it
-    affects."""
+    """Groups of parameters of different limbs, each with its index and the indices of the joints that it affects."""
     limb = {joint: _limb(machine, joint) for joint in machine.joints}
     joints = {one: [k for k, j in enumerate(machine.joints) if limb[j] == one] for one in set(limb.values())}
     waiting: dict[int, list[tuple[int, list[int]]]] = {one: [] for one in joints}

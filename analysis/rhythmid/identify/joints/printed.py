@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
 
 def show_identification(found: "MachineIdentification", console: Console) -> None:
-    """Print an identification: parameters, inertias, errors, and parameters that are not identifiable
-    separately."""
+    """Print an identification: parameters, inertias, errors, and parameters that are not identifiable separately."""
     if not found.usable:
         missed = ", ".join(map(escape, found.not_identified))
         console.print(

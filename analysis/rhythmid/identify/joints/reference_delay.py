@@ -1,5 +1,4 @@
-"""Delay of controllers' references relative to their timestamps, where efforts are computed from references and
-gains.
+"""Delay of controllers' references relative to their timestamps, where efforts are computed from references and gains.
 
 The delay of each joint is a parameter of its effort balance and has an interval. References of several joints
 usually arrive in one message, so all have one delay. The delay with which most joints agree is shared. A test says

@@ -1,5 +1,4 @@
-"""Lead of the reference in a recorded effort over the acting reference, where references are held between
-timestamps.
+"""Lead of the reference in a recorded effort over the acting reference, where references are held between timestamps.
 
 Suppose a drive reports its effort at the instant at which a new reference arrives. It then reports k_p (r - x) -
 k_d v of that instant. On average over the period T an older reference acts, by T/2 minus half of the controller's

@@ -36,8 +36,7 @@ NOTHING_NEW = 0.98  # ratio of chi2 above which a scan brings no improvement
 
 
 def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None) -> Fit:
-    """The fit of a model with an independent clock, with the most likely ticks found under its residual noise
-    model.
+    """The fit of a model with an independent clock, with the most likely ticks found under its residual noise model.
 
     The noise model is at least `floor` [unit of the measurement]; the fit is returned under it, unless the fit is
     unchanged.
@@ -111,8 +110,7 @@ def _grid(period: float, longest: float, sample: float, reach: float, late: floa
 
 
 def _costs(fit: Fit, places: Sequence[int], cases: Array, pool: ThreadPoolExecutor | None) -> Array:
-    """Chi2 (n,) of the cases with all other fitted parameters following linearly; infinite where the model
-    diverges."""
+    """Chi2 (n,) of the cases with all other fitted parameters following linearly; infinite where the model diverges."""
     others, _ = np.linalg.qr(_scaled(np.delete(fit.linearisation.jacobian, places, axis=1)))
     outputs = fit.run.many([(moved_to(fit, places, case), fit.starts) for case in cases], pool)
     costs = np.full(len(cases), np.inf)
