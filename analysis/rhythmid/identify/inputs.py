@@ -16,7 +16,6 @@ Pieces = tuple[Array, Array]
 SMOOTHED_FROM = 16  # number of knots above which a command gets a smooth surrogate
 # number of a command's knots above which its pieces are rebuilt for each run. Measured at 300 000 knots: 1 % of the
 # run's time for a held command and 4 % for a cubic one, whose pieces would take 5 and 12 MB
-# and 4 % for a cubic one, whose pieces would hold 5 and 12 MB
 LONG = 100_000
 
 

@@ -41,7 +41,6 @@ STEP, FINE_STEP = (
 )  # integration step as a share of a block; the second where the limit cycle is not used
 # required ratio of errors for a delay one period of the motion longer: a periodic motion looks the same a period
 # later, except at its start
-# where it begins
 LATER_PERIOD = 0.7
 EARLIEST = 1.5  # samples by which an estimated delay may be negative
 NO_PUMPING = Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none")

@@ -20,7 +20,6 @@ MILLION = 1e6  # ratio above which only the shift is reported: one of the two va
 PASSED_BY = 2.0  # standard deviations by which an estimate has to exceed a limit
 # standard deviations, and a share of a sample, by which a delay has to be negative to be reported: with two
 # standard deviations, a machine without delay would be reported once in 40 times
-# would be accused once in 40 times at two of them
 EARLY, EARLY_LEAST = 4.0, 0.05
 # standard deviations of the closure within which limit cycle and response agree about the delays
 AGREES = 5.0

@@ -32,15 +32,12 @@ PUSH = 1e-3  # constant test force as a share of the machine's inertial force
 GROWTH = 1.5
 # share of the whole motion below which a growing displacement does not mean that the machine integrates: three
 # times the displacement that the test force causes on a spring which holds the mass in the dominant motion
-# a spring that holds the mass in the dominant motion
 HELD = 3.0 * PUSH
 # share of the motion at the end of a record below which a phase shift by the test force is acceptable: twenty times
 # the effect at rest, so that a force error of 1.5 %, usual in models of real machines, stays below 30 %
-# rest, so that an error of the model of 1.5 % of the forces, which models of real machines have, stays below 30 %
 SAME_SWING_SHARE = 0.02
 # share of the whole motion above which the run with the test force is unrelated to that without it: runs of a
 # chaotic machine end 1.4 times the motion apart, and no further
-# 1.4 times the motion apart, and no further
 PARTED = 0.5
 WINDOW_PERIODS = 2.0  # periods of the dominant motion in a window
 FEWEST_WINDOWS = 4  # windows per record

@@ -25,7 +25,6 @@ LOST = 0.3  # error as a share of the motion above which the model no longer fol
 # largest ratio of the error of the whitened fit to that of ordinary least squares. With a noise residual the
 # whitened fit costs almost nothing; motion that the model misses would be whitened away and traded for a smaller
 # innovation
-# noise costs the weighted fit next to nothing of it; motion that the model misses is whitened away and given up for what is left
 MISLED = 1.25
 # increase of chi2 up to which a parameter is fixed at a bound that it cannot be distinguished from
 FALSE_EDGE = 25.0

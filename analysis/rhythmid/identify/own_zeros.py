@@ -22,7 +22,6 @@ Array = NDArray[np.float64]
 # share of the squared error that free zeros may leave: they must explain nearly all of it. A larger rest may be an
 # effect that shifts the mean with the amplitude, which only a search among effects can tell (a hopper with a
 # quadratic spring leaves 0.36)
-# shifts with its amplitude, which a search among effects can tell and this cannot (a hopper with a quadratic spring leaves 0.36)
 LEFT = 0.2
 
 

@@ -22,7 +22,6 @@ from rhythmid.identify.student import weights_of
 Array = NDArray[np.float64]
 # blocks of all records together: enough to know a standard deviation to a ninth, 1/sqrt(2 BLOCKS), and so few that
 # each is longer than the correlation of the residuals
-# that each outlasts what is not noise
 BLOCKS = 40
 # probability of a larger scatter of blocks of white noise: a smaller scatter is no evidence against the information
 CHANCE = 0.025

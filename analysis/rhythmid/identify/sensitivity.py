@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 # share of a sensitivity below which its remainder after projection is finite-difference error: differences move the
 # motion by a ten-thousandth, and a pendulum's angle at rest, which the initial state can absorb, leaves up to
 # 1.2e-3 of its effect
-# ten-thousandth, and an angle at rest that the start of a pendulum makes up for leaves up to 1.2e-3 of its effect
 DEAD = 3e-3
 # share of the motion below which a difference is rounding error; the step then grows up to the size of its
 # parameter, not further
@@ -28,7 +27,6 @@ SEEN = 1e-15
 COARSER = 4.0
 # largest error of coarser steps as a share of the residual: the directions in which a fit still improves move the
 # outputs by about the residual
-# by about the residual
 COARSE_ERROR = 0.1
 
 

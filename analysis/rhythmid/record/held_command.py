@@ -13,13 +13,10 @@ from rhythmid.record.record import Channel
 Array = NDArray[np.float64]
 # ratio of the input's interval to the output's above which the input is far sparser. Loggers sample measured
 # signals together, or divide a clock by a small number
-# a clock by some small number
 SPARSE = 10.0
 # ratio of rms errors, a line through both neighbours over the sample before, below which samples resolve the
 # signal. It is sin(π f T) for a sine of frequency f sampled every T [s], so this is six samples per period, of
 # which a line misses 13 %. Unrelated steps give 0.71, independent samples 0.87
-# sin(π f T) for a sine f sampled every T [s], so this is six samples a period, of which a line misses 13 %; steps that have nothing
-# to do with each other leave 0.71, independent samples 0.87
 RESOLVED = 0.5
 LEAST_SAMPLES_TO_RESOLVE = 3  # samples, of which one has two neighbours
 

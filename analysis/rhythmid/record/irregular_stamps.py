@@ -13,7 +13,6 @@ Array = NDArray[np.float64]
 COMMON = 0.01  # share of long steps up to which they are single gaps of any length
 # median distance of long steps from a whole number of periods: up to NEAR it is rounding of timestamps with lost
 # samples; above FAR jitter of less than 0.3 periods cannot cause it (times without a period give a quarter)
-# beyond FAR jitter of less than 0.3 periods does not (a quarter is what times without any period give)
 NEAR, FAR = 0.1, 0.2
 # ratio of this distance to that of the other steps from one period, used between NEAR and FAR: jitter affects both alike
 FARTHER = 2.0

@@ -13,7 +13,6 @@ from rhythmid.record.timing import Timing
 
 # least size (rms) of the steps beside a plateau, relative to the usual step, for a motion that continues: a sine
 # clipped at 99 % of its size has 0.2 there, one that comes to rest has none
-# 99 % of its size has 0.2 there, one that comes to rest has none
 MOVING = 0.05
 CLIPPED_RUN = 4  # consecutive samples at the extreme value
 CLIPPED_EXCESS = 5  # ratio of samples in such runs to samples at the next value

@@ -19,7 +19,6 @@ HALFWAY = 0.5  # half of that distance
 # least duration of a rest before the motion, relative to the time from the start to half of the distance. A machine
 # released at the first sample stays within a fiftieth for at most a quarter of that time: the parabola of a
 # constant force
-# stays within a fiftieth for a quarter of that time at most: that is the parabola of a constant force
 LONG = 1.0
 
 

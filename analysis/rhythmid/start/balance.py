@@ -21,7 +21,6 @@ EARNS_PLACE = 0.9  # ratio of residuals to which an element has to lower the bal
 # share of the driving signal's power that the element also has to explain: less may be friction, ripple and noise,
 # which any element absorbs at random. With a delay of half a radian, inertia, damper and spring leave (ω τ)²/2 of
 # the size, which is as much; with a shorter one less
-# Of a delay of half a radian, inertia, damper and spring leave (ω τ)²/2 of the size, which is as much; of a shorter one less
 OF_THE_DRIVE = 0.015
 STEADY = 1e-9  # relative variation below which the driving signal is constant: rounding error of the filters
 COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant", "friction")

@@ -39,7 +39,6 @@ ELEMENT = Element(
     ],
     # reversal of sliding takes two yield displacements: in cycles of a shorter travel it approaches a spring (the
     # difference from a spring is 7 % of its mean square at the end of this range, 1.5 % at twice that)
-    # it does 7 % of its mean square at the end of this range, 1.5 % at twice that)
     ranges=lambda s: {"yield_displacement": (0.0, 0.5 * (s.high - s.low))},
     against="base",
     also_known_as=("smooth hysteresis", "Dahl friction", "presliding friction"),

@@ -36,7 +36,6 @@ ELEMENT = Element(
     ],
     # reversal of sliding takes two yield displacements: in cycles of a shorter travel it is a spring (the
     # difference from a spring is 3 % of its mean square at the end of this range, 0.2 % at twice that)
-    # it does 3 % of its mean square at the end of this range, 0.2 % at twice that)
     ranges=lambda s: {"yield_displacement": (0.0, 0.5 * (s.high - s.low))},
     against="base",
     also_known_as=(

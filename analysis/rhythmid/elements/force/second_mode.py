@@ -77,7 +77,6 @@ ELEMENT = Element(
     starts=starts,
     # slower than the motion it is a mass at rest with a viscous damper; slower than a record it is a force set by
     # its initial state; faster than the samples it is an added mass; overdamped it is a relaxation
-    # start makes; faster than the samples, an added mass; overdamped, something that relaxes
     ranges=lambda s: {
         "frequency": (max(0.3 * min(s.natural_frequency, s.frequency), 1.0 / s.duration), 0.5 / s.period),
         "damping_ratio": (0.0, 1.0),

@@ -20,14 +20,12 @@ from rhythmid.simulation.generated_source import OutputKind
 # condition number of the scaled regressor above which a robot's parameters are not sufficiently excited (K.
 # Schröer, in: Robot Calibration, Chapman & Hall, 1993; M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 aim
 # below it)
-# Calibration, Chapman & Hall, 1993; M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 aim below it)
 CONDITION = 100.0
 # least share of the effort's power that a free map of the motion explains; with less, this effort does not make the
 # motion
 EXPLAINED_BY_MOTION = 0.5
 # least variation of the effort relative to the inertial force: below it the machine swings freely, and the balance
 # is a small difference of two large terms (a resonance of 10 % damping is driven by a fifth of its inertial force)
-# large terms is weighed (a resonance of 10 % damping is driven by a fifth of its inertial force)
 LIGHT = 0.2
 POINTS = 50  # positions at which a restoring force is evaluated
 

@@ -34,7 +34,6 @@ from rhythmid.value import Value
 Array = NDArray[np.float64]
 # cut-off periods at both ends of a stretch in which the filter's transient is several times the noise (measured on
 # flights between contacts)
-# flights between contacts)
 CLEAR = 1.5
 SHORT = 400  # largest number of samples in a stretch for which its filter is a matrix
 FAINT = 1e-3  # share of a joint's effort below which the effect of a link on it is neglected

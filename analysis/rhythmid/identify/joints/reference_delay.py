@@ -28,7 +28,6 @@ FIRST = 3  # Gauss-Newton steps of the fit before the scan of delays: the parame
 # share of a sample that timestamp jitter and interpolation add to the standard deviation of a joint's delay
 # (measured: delays of joints on one bus scatter by 0.01 to 0.02 of a sample; their standard deviations from noise
 # alone are smaller)
-# scatter by 0.01 to 0.02 of a sample, their standard deviations by the noise alone are smaller)
 ROUGH = 0.03
 # share of a sample: standard deviation within which joints count as agreeing, as a missing effect may shift the
 # phase of one
