@@ -1,12 +1,12 @@
-"""An experiment with a machine of several joints, and its run without ROS. Example of a file:
+"""An experiment with a machine of several joints, and its run without ROS. Example of its file:
 
 model: leg.yaml                  # for `rhythmid run`; `rhythmid simulate` names it
 duration: 20                     # s
 rate: 500                        # Hz, of commands and measurements
 seed: 0
 namespace: /leg
-start: {rail: 0.42}              # positions of joints; the driven ones begin where their excitation does
-orthogonal: true                 # the joints' multisines share the lines out among them
+start: {rail: 0.42}              # positions of joints; those of driven joints start where their excitation does
+orthogonal: true                 # the joints' multisines use disjoint sets of spectral lines
 excitation:                      # by joint: a reference where a controller is in the path, else a force
   hip:  {offset: 0.6, limits: [-0.5, 1.5], type: multisine, …}
   knee: {offset: -1.2}           # held

@@ -2,11 +2,11 @@
 the effect.
 
 A command that is late by ε gives the machine the impulse −ε ΔF, where ΔF is the step of the command. The effect in
-the record has the spectrum of the machine's own response. In a record of a few decay times it cannot be told from
-other residuals, because the fit has absorbed most of it into the parameters. It can be simulated, however. Runs
-with jittered commands give the spectrum; the size of the many innovations gives the standard deviation of the
-jitter. Jitter shows in innovations that are larger where the command's steps were larger. They must not follow from
-the command itself, as the effect of a missing element would.
+the record has the spectrum of the machine's own response. In a record of a few decay times it cannot be
+distinguished from other residuals, because the fit has absorbed most of it into the parameters. It can be
+simulated, however. Runs with jittered commands give the spectrum; the size of the many innovations gives the
+standard deviation of the jitter. Jitter shows in innovations that are larger where the command's steps were larger.
+They must not follow from the command itself, as the effect of a missing element would.
 """
 
 import math

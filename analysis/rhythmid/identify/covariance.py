@@ -1,4 +1,4 @@
-"""Covariance of a fit, and the parameters whose estimates are too close to a bound to be told from it."""
+"""Covariance of a fit, and the parameters whose estimates are too close to a bound to be distinguished from it."""
 
 import math
 from collections.abc import Sequence

@@ -33,11 +33,11 @@ class HeldOutRun:
     Attributes
     ----------
     record
-            The record as it is compared.
-        fit
-            The free run beside the record; None where the model cannot be simulated over it.
-        missing
-            Reason for that.
+        The record as it is compared.
+    fit
+        The free run beside the record; None where the model cannot be simulated over it.
+    missing
+        Reason for that.
     """
 
     record: Record
@@ -89,9 +89,9 @@ class HeldOut:
 def admitted_unseen(
     holdout: Sequence[Record], fitted: Sequence[Record], model: Model
 ) -> tuple[tuple[Record, ...], tuple[str, ...]]:
-    """The held-out records after cleaning, without those in which the machine stands still, and notes about them.
+    """The held-out records after cleaning, without those in which the machine is at rest, and notes about them.
 
-    Raises InputError where the machine stands still in all of them, for a record that declares a parameter that the
+    Raises InputError where the machine is at rest in all of them, for a record that declares a parameter that the
     model does not have, and for a record that cannot come from the machine of the `fitted` ones in the same units.
     """
     if not holdout:
@@ -114,11 +114,11 @@ def held_out_runs(
     Parameters
     ----------
     model
-            The identified model.
-        joint
-            The fit that produced it; None for the paper's method.
-        fitted, unseen
-            Records used in the fit, and held-out records.
+        The identified model.
+    joint
+        The fit that produced it; None for the paper's method.
+    fitted, unseen
+        Records used in the fit, and held-out records.
     """
     if joint is None:
         series = prepare(fitted)

@@ -66,13 +66,13 @@ class Observables:
     Attributes
     ----------
     phase
-            Phase of the limit cycle, A = τ_y + δ_f [s].
-        slope
-            Slope of the response's phase, B = τ_u + τ_y [s].
-        offset
-            Offset of the sidebands' phases, C = τ_u − δ_f [s].
-        z
-            Closure A + C − B divided by its standard deviation.
+        Phase of the limit cycle, A = τ_y + δ_f [s].
+    slope
+        Slope of the response's phase, B = τ_u + τ_y [s].
+    offset
+        Offset of the sidebands' phases, C = τ_u − δ_f [s].
+    z
+        Closure A + C − B divided by its standard deviation.
     """
 
     phase: Estimate
@@ -91,13 +91,13 @@ class InnerDelay:
     Attributes
     ----------
     delay
-            The dead time [s]; without a value where it is not `separable`.
-        separable
-            Whether the dead time alone is identifiable.
-        reason
-            Why not, where it is not.
-        sums
-            Identifiable sums with other delays [s], by their elements' labels.
+        The dead time [s]; without a value where it is not `separable`.
+    separable
+        Whether the dead time alone is identifiable.
+    reason
+        Why not, where it is not.
+    sums
+        Identifiable sums with other delays [s], by their elements' labels.
     """
 
     delay: Estimate
@@ -120,20 +120,20 @@ class Delays:
     Attributes
     ----------
     input, measurement, sum
-            τ_u, τ_y and τ_u + τ_y [s]. Input and measurement delay have no value where they are not `separable`.
-        separable
-            Whether both delays are identifiable separately.
-        assumption
-            Assumption on which the separation rests.
-        closure
-            Limit-cycle phase + sideband offset − slope of G_0, divided by its standard deviation. It is near zero
-            for a correct model. None where one of the three is not identifiable.
-        aliases
-            Further pairs with the same fit.
-        intervals
-            95 % intervals of delays that are not separable [s].
-        undetermined
-            Changes of parameters to which the records are insensitive, in words.
+        τ_u, τ_y and τ_u + τ_y [s]. Input and measurement delay have no value where they are not `separable`.
+    separable
+        Whether both delays are identifiable separately.
+    assumption
+        Assumption on which the separation rests.
+    closure
+        Limit-cycle phase + sideband offset − slope of G_0, divided by its standard deviation. It is near zero for a
+        correct model. None where one of the three is not identifiable.
+    aliases
+        Further pairs with the same fit.
+    intervals
+        95 % intervals of delays that are not separable [s].
+    undetermined
+        Changes of parameters to which the records are insensitive, in words.
     inner
         Dead times inside the machine, by their elements' labels.
     """
@@ -186,25 +186,25 @@ class Identification(Result):
     Attributes
     ----------
     model
-            The model with all estimates, delays included.
-        parameters
-            Estimates by "element.parameter".
-        delays
-            Of the command and measurement paths.
-        shown
-            Transfer functions, as far as their conditions hold.
-        paper
-            Results of the paper's method, record by record; empty where it gives none.
-        quality
-            Rate [Hz], gaps, jitter_std [s], nrmse and other measures of the quality of records and fit.
-        joint
-            The joint fit; None where another method was requested.
-        notes
-            Messages for the user, one line each.
-        cautions
-            Reasons to doubt the estimates.
-        held_out
-            Free runs of the identified model over the held-out records; None without such records.
+        The model with all estimates, delays included.
+    parameters
+        Estimates by "element.parameter".
+    delays
+        Of the command and measurement paths.
+    shown
+        Transfer functions, as far as their conditions hold.
+    paper
+        Results of the paper's method, record by record; empty where it gives none.
+    quality
+        Rate [Hz], gaps, jitter_std [s], nrmse and other measures of the quality of records and fit.
+    joint
+        The joint fit; None where another method was requested.
+    notes
+        Messages for the user, one line each.
+    cautions
+        Reasons to doubt the estimates.
+    held_out
+        Free runs of the identified model over the held-out records; None without such records.
 
     Examples
     --------
@@ -302,14 +302,14 @@ class Identification(Result):
         Parameters
         ----------
         axis
-                Matplotlib axis; None for a new figure.
-            record
-                Index of the record.
+            Matplotlib axis; None for a new figure.
+        record
+            Index of the record.
 
-            Raises
-            ------
-            InputError
-                For the paper's method, which does not simulate.
+        Raises
+        ------
+        InputError
+            For the paper's method, which does not simulate.
         """
         if self.joint is None:
             raise InputError("the paper's method has no free run to draw; identify with method='joint'")

@@ -113,23 +113,22 @@ def identify(
     records
         One or more recordings of the same machine.
     model
-            Prior knowledge of the machine; None for the paper's hopper.
-        harmonics
-            M, the number of sidebands on either side that the paper's method estimates.
-        method
-            `joint` maximum likelihood, or the `paper`'s two steps.
-        forcing
-            How the forcing reaches the machine; see `delays_of`.
-        offset
-            Prior knowledge of the offset of the forcing's clock [s].
-        htf
-            Estimator of the harmonic transfer functions of the first record; see `harmonic_transfer_functions`.
-            With `auto`
-            the paper's method uses its own, equation (5).
-        tell
-            Called with a sentence at the start of each step.
-        holdout
-            Records for validation only: they are not used in the fit, and the identified model is simulated over them.
+        Prior knowledge of the machine; None for the paper's hopper.
+    harmonics
+        M, the number of sidebands on either side that the paper's method estimates.
+    method
+        `joint` maximum likelihood, or the `paper`'s two steps.
+    forcing
+        How the forcing reaches the machine; see `delays_of`.
+    offset
+        Prior knowledge of the offset of the forcing's clock [s].
+    htf
+        Estimator of the harmonic transfer functions of the first record; see `harmonic_transfer_functions`. With
+        `auto` the paper's method uses its own, equation (5).
+    tell
+        Called with a sentence at the start of each step.
+    holdout
+        Records for validation only: they are not used in the fit, and the identified model is simulated over them.
 
     Returns
     -------

@@ -1,9 +1,9 @@
 """Dead times inside the machine: which are identifiable, and otherwise which sums of delays are.
 
 Without a controller, a dead time of the actuator delays every force that drives the machine, and so the motion.
-Nothing in the record tells it from a measurement delay. Inside a controller's loop a dead time moves the poles of
-the loop, which is observable. Forcing, reference and loop then show three sums of the four delays τ_u, τ_a, τ_f and
-τ_y. The sensitivities show what is not identifiable, for any machine.
+Nothing in the record distinguishes it from a measurement delay. Inside a controller's loop a dead time moves the
+poles of the loop, which is observable. Forcing, reference and loop then show three sums of the four delays τ_u,
+τ_a, τ_f and τ_y. The sensitivities show what is not identifiable, for any machine.
 """
 
 from collections.abc import Sequence

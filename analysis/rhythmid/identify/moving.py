@@ -11,7 +11,7 @@ from rhythmid.record.standstill import standstill
 def moving(clean: Sequence[Cleaned]) -> tuple[list[Cleaned], tuple[str, ...]]:
     """The records in which the machine moves, and a note on each record that is left out.
 
-    Noise that may hide a motion is kept and judged by the fit. Raises InputError where the machine stands still in all
+    Noise that may hide a motion is kept and judged by the fit. Raises InputError where the machine is at rest in all
     records.
     """
     found = [(one, standstill(one.record, buried=False)) for one in clean]

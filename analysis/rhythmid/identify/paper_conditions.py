@@ -5,7 +5,8 @@ import numpy as np
 from rhythmid.identify.paper import PaperResult
 from rhythmid.ltp.pumping import Pumping
 
-LEAKAGE = 0.05  # share of the command that may differ between before and the end of the window
+# largest difference between the commands before and at the end of the window, as a share of the command
+LEAKAGE = 0.05
 # largest response to the command relative to the limit cycle's motion (rms): with a quadratic law the response is
 # distorted by as much
 SMALL_RESPONSE_SHARE = 0.1

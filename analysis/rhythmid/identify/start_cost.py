@@ -76,8 +76,8 @@ def start_cost(starts: Sequence[FeltStart]) -> float:
 def start_freedom(starts: Sequence[FeltStart]) -> float:
     """Effective number of parameters of the element states' starts: tr H'H (I + H'H)^-1 over all series.
 
-    On average, the log density with fitted starts exceeds that on other data by this number
-    (D. J. Spiegelhalter et al., J. R. Stat. Soc. B 64 (2002) 583).
+    On average, the log density with fitted starts exceeds that on other data by this number (D. J. Spiegelhalter et
+    al., J. R. Stat. Soc. B 64 (2002) 583).
     """
     total = 0.0
     for one in starts:

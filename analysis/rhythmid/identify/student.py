@@ -1,8 +1,7 @@
 """Student's t errors: scale, density, weights of reweighted least squares, and autocorrelation time of residuals.
 
 Outliers and effects that no model explains get small weights (K. L. Lange, R. J. A. Little, J. M. G. Taylor, J. Am.
-Stat. Assoc. 84
-(1989) 881).
+Stat. Assoc. 84 (1989) 881).
 """
 
 import math

@@ -40,7 +40,8 @@ TINY = 1e-300  # replaces a mean square of zero
 EVEN_SPEED = 1e-12
 UNEXPLAINED = 1.5  # ratio to the noise floor above which a hold is searched
 HOLD_GAIN = 25.0  # least decrease of chi2 by a hold
-SLOWER = 3.0  # least period of a hold, in sample periods, that can be told from the commands' own hold
+# least period of a hold, in sample periods, that can be distinguished from the commands' own hold
+SLOWER = 3.0
 LONGEST_HOLD = 0.25  # [s] longest interval between two commands that the drive takes
 REACH = 0.05  # least share of a rough period searched on either side of it
 FINEST = 200  # largest number of periods tried there

@@ -136,7 +136,7 @@ class PeriodMap:
         return self.rows(start, self.ends)[-1, : len(start)]
 
     def relaxed(self, start: Array, periods: int) -> Array:
-        """The state after so many periods."""
+        """The state after `periods` periods."""
         for _ in range(periods):
             start = self(start)
         return start

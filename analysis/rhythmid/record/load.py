@@ -24,10 +24,10 @@ def load(
         A bag directory, an .mcap or .db3 file, a table (.csv, .mat, .npz, .parquet), or a signals.yaml that names
         tables.
     signals
-            Mapping of the channels: a signals.yaml, or its content as a mapping; by default the topics of rhythmid's own
-            nodes.
-        use
-            Start and end [s] of the part of the recording to use.
+        Mapping of the channels: a signals.yaml, or its content as a mapping; by default the topics of rhythmid's own
+        nodes.
+    use
+        Start and end [s] of the part of the recording to use.
 
     Returns
     -------

@@ -1,5 +1,5 @@
-"""Channels that are copies of the output: the same sensor in volts and millimetres, or the output of a position
-controller."""
+"""Channels that are copies of the output: the same sensor in volts and millimetres, or the effort of a controller
+that holds a position."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -78,9 +78,9 @@ class Uniform:
     period, rate
         Of the grid [s, Hz].
     valid
-            Bool[n]; False where a channel has a gap that cannot be interpolated reliably from its neighbours.
-        missing
-            Bool[n]; True within any gap of a channel, whether it can be interpolated or not.
+        Bool[n]; False where a channel has a gap that cannot be interpolated reliably from its neighbours.
+    missing
+        Bool[n]; True within any gap of a channel, whether it can be interpolated or not.
     """
 
     time: Array
@@ -123,18 +123,18 @@ class Record(Result):
     output_kind
         Position, velocity or acceleration.
     forcing_law
-            Formula of the forcing, if it is given by one; `forcing` then holds samples of it.
-        run
-            Description of the experiment in the recording itself.
-        parameters
-            Declared values of the model's parameters in this record, by "element.parameter".
-        whole
-            Name of the record of which this is a stretch; empty for a whole one.
-        stamped
-            Whether the output's times are measured timestamps, which may jitter; False where they follow from a
-            declared rate.
-        one_clock
-            Whether all channels are columns of one table with one time, so that there is no clock drift between them.
+        Formula of the forcing, if it is given by one; `forcing` then holds samples of it.
+    run
+        Description of the experiment in the recording itself.
+    parameters
+        Declared values of the model's parameters in this record, by "element.parameter".
+    whole
+        Name of the record of which this is a stretch; empty for a whole one.
+    stamped
+        Whether the output's times are measured timestamps, which may jitter; False where they follow from a
+        declared rate.
+    one_clock
+        Whether all channels are columns of one table with one time, so that there is no clock drift between them.
 
     Examples
     --------

@@ -8,7 +8,8 @@ import math
 
 from rhythmid.elements.element import Element, Parameter
 
-FEWEST_PERIODS = 5  # in the longest record; with fewer, a line cannot be told from a phase and a trend
+# in the longest record; with fewer, a line cannot be distinguished from a phase and a trend
+FEWEST_PERIODS = 5
 
 
 def kernel(x, v, t, f, amplitude, frequency, phase):

@@ -301,8 +301,9 @@ def _with_fit(
 def _aligned(balance: Balance, joint: str, common: ReferenceDelay | None) -> Alignment | None:
     """Prior of the delay of a joint's reference, relative to the shared delay; None where its effort was recorded.
 
-    Its width is that of the shared delay where the joints agree. Otherwise it is one sample, as for timestamps, or
-    the joint's own uncertainty if larger.
+    Its standard deviation is that of the shared delay where all joints agree. If only some agree, it is one sample
+    for these, as for timestamps. For a joint with another delay, the prior is about its own delay and at least one
+    sample wide.
     """
     if common is None or joint not in common.joints:
         return None

@@ -194,9 +194,9 @@ def joint_model(
     """The path of a joint as a model with one axis; masses, inertias and payloads of links are parameters of a term
     `body`.
 
-    The actuator is left out where the effort was recorded after it. A mass or inertia in `rotors`, with the same
-    effect as the rotor's inertia, may change only by a reduction of more than the whole rotor. Any smaller change
-    is attributed to the rotor, which files of robots seldom state well.
+    The actuator is left out where the effort was recorded after it. A mass or inertia in `rotors` has the same
+    effect as the rotor's inertia. Its upper bound is the given value minus the equivalent of the whole rotor: any
+    smaller change is attributed to the rotor, which files of robots seldom state well.
     """
     path = machine.paths[joint]
     terms = [t for t in path.terms if taken != "after_actuator" or t.element.slot != "actuator"]
