@@ -61,7 +61,7 @@ class Principal:
 
     def turned(self, axis: Array, inertia: float) -> "Principal":
         """The inertia with this moment about an axis (3,) through the centre. All moments are scaled by one factor,
-        so they remain physically consistent; where all are zero, they become those of a ball."""
+        so they remain physically consistent; where this moment is zero, they become those of a ball."""
         known = self.about(axis)
         moments = self.moments * (inertia / known) if known > 0.0 else np.full(3, inertia)
         return replace(self, moments=moments)

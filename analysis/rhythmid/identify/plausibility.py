@@ -35,7 +35,7 @@ from rhythmid.record.record import Record
 from rhythmid.report.quantity import number
 
 STRETCH = 15.0  # periods that are used: enough for a resonance of 2 % damping to ring down
-SHORT = 4.0  # periods where a search may fail over a longer stretch, such as in large swings
+SHORT = 4.0  # periods where a search may fail over a longer stretch, such as in large oscillations
 ITERATIONS = 12  # iterations of each refit: the right change converges in fewer
 # largest ratio of the unexplained share with a change to that as declared; it must also be below `POOR_MOTION`
 BETTER_UNIT = 0.4

@@ -14,7 +14,7 @@ def tolerable_error(output: Channel) -> float:
     """Error of a command, as a share of its size times its duration [s], whose effect on the motion is below the noise.
 
     An impulse J changes the speed by J/m. A command of size U moves a mass by about U/(m w²), with w the angular
-    frequency of its motion. So an error e U during a time T moves it by the share e w T.
+    frequency of its motion. So an error e U during a time T changes the motion by the share e w T.
     """
     value, span = output.value - output.value.mean(), output.time[-1] - output.time[0]
     size = float(np.std(value))
