@@ -1,4 +1,4 @@
-"""The paths of a machine's joints inside the MJCF that is written of it: as a text of the file's own, which MuJoCo hands on."""
+"""Embeds the paths of a machine's joints in its MJCF file, as a custom text that MuJoCo keeps."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,18 +11,18 @@ from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
 
-NAME = "rhythmid"  # of the text in the file
+NAME = "rhythmid"  # name of the text in the file
 ABSENT = "the model holds no paths of joints: write its file with  rhythmid export MACHINE.yaml --to mujoco --out FILE.xml"
 
 
 def text_of(paths: Mapping[str, Model]) -> str:
-    """Paths as one line, from which `paths_in` makes them again."""
+    """Paths as one line of text; `paths_in` is the inverse."""
     plain = {joint: yaml.safe_load(model.to_yaml()) for joint, model in paths.items()}
     return yaml.safe_dump(plain, default_flow_style=True, sort_keys=False, width=10**9).strip()
 
 
 def paths_in(model: Any, elements: tuple[str, ...] = ()) -> dict[str, Model]:
-    """The paths that a compiled model's file holds. Raises InputError where it holds none, or names an unknown element."""
+    """The paths in the file of a compiled model. Raises InputError where it holds none, or names an unknown element."""
     number = mujoco().mj_name2id(model, mujoco().mjtObj.mjOBJ_TEXT, NAME)
     if number < 0:
         raise InputError(ABSENT)

@@ -1,4 +1,4 @@
-"""Means of held signals over the steps of an integration, the same whether they are asked for all at once or in parts."""
+"""Means of held signals over the steps of an integration, identical for one call and for several partial calls."""
 
 from numba import njit
 
@@ -9,11 +9,12 @@ from numba import njit
     error_model="numpy",
 )
 def held_means(knots, level, edges, before, out):
-    """Mean over each step of signals that keep `level` (k, joints) from their knots (k, joints) [s] on, and are `before` (joints,) until
-    the first; `edges` (n + 1,) [s] are the steps' begins and the last one's end, `out` (n, joints)."""
+    """Mean over each step of signals that hold `level` (k, joints) from their knots (k, joints) [s] on, and
+    `before` (joints,) until the first knot. `edges` (n + 1,) [s] are the starts of the steps and the end of the
+    last, `out` (n, joints) the result."""
     count = knots.shape[0]
     for j in range(out.shape[1]):
-        following = 0  # the first knot behind the step's begin
+        following = 0  # first knot after the step's start
         value = before[j]
         for k in range(out.shape[0]):
             while following < count and knots[following, j] <= edges[k]:

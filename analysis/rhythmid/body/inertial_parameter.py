@@ -1,4 +1,5 @@
-"""The inertial parameters of a body: mass and rotational inertia of a link, a payload at the end of one, and the inertia of a rotor."""
+"""Inertial parameters of a body: mass and rotational inertia of a link, a payload at its end, and the inertia of a
+rotor."""
 
 from rhythmid.elements.element import Parameter
 
@@ -18,7 +19,7 @@ def split(name: str) -> tuple[str, str]:
 
 
 def described(name: str) -> Parameter:
-    """What a parameter "owner.kind" is, in translational units."""
+    """Definition of a parameter "owner.kind", in translational units."""
     _, kind = split(name)
     unit = "kg*m^2" if kind == TURNING else "kg"
     return Parameter(kind, unit, MEANING[kind], bounds=(0.0, float("inf")))

@@ -1,12 +1,12 @@
-"""An experiment with a machine of several joints, and its run without ROS.
+"""An experiment with a machine of several joints, and its run without ROS. Example of its file:
 
 model: leg.yaml                  # for `rhythmid run`; `rhythmid simulate` names it
 duration: 20                     # s
 rate: 500                        # Hz, of commands and measurements
 seed: 0
 namespace: /leg
-start: {rail: 0.42}              # positions of joints; the driven ones begin where their excitation does
-orthogonal: true                 # the joints' multisines share the lines out among them
+start: {rail: 0.42}              # positions of joints; those of driven joints start where their excitation does
+orthogonal: true                 # the joints' multisines use disjoint sets of spectral lines
 excitation:                      # by joint: a reference where a controller is in the path, else a force
   hip:  {offset: 0.6, limits: [-0.5, 1.5], type: multisine, …}
   knee: {offset: -1.2}           # held
@@ -41,21 +41,21 @@ if TYPE_CHECKING:
     from rhythmid.body.joint_plant import JointPlant
 
 Array = NDArray[np.float64]
-MOST_RUN_SAMPLES = 10_000_000  # samples of a run
-AT_ONCE = 10_000  # samples of a run that are simulated together
+MOST_RUN_SAMPLES = 10_000_000  # largest number of samples in a run
+AT_ONCE = 10_000  # samples that are simulated together
 TOPICS = ("command", "joint_states")
 
 
 @dataclass(frozen=True)
 class JointExcitation:
-    """What one joint is commanded: an offset and an excitation about it, within limits."""
+    """The command of one joint: an offset and an excitation about it, within limits."""
 
     offset: float = 0.0
     limits: tuple[float, float] = (-math.inf, math.inf)
     excitation: Excitation | None = None
 
     def __call__(self, time: Array, share: Array | float = 1.0) -> Array:
-        """Commands at times (n,) [s], with a share of the excitation."""
+        """Commands at times (n,) [s], with the excitation scaled by `share`."""
         value = np.full(len(time), self.offset)
         if self.excitation is not None:
             value = value + share * self.excitation(time)
@@ -64,7 +64,7 @@ class JointExcitation:
 
 @dataclass(frozen=True)
 class JointWatch:
-    """What a joint's measurements must keep to in real time: a range of positions and a speed."""
+    """Real-time limits of a joint's measurements: a range of positions and a speed."""
 
     __pydantic_config__ = ConfigDict(extra="forbid")
     envelope: Range = (-math.inf, math.inf)
@@ -73,9 +73,10 @@ class JointWatch:
 
 @dataclass(frozen=True)
 class JointSafety:
-    """Limits of a run: as of one axis, see `rhythmid.settings.Safety`, with those of a joint by its name.
+    """Limits of a run: those of one axis, see `rhythmid.settings.Safety`, and those of each joint by its name.
 
-    Commands never leave the `limits` of a joint's excitation. A reference that nobody renews is held; a force fades to zero.
+    Commands never leave the `limits` of a joint's excitation. A reference that is not renewed is held; a force
+    fades to zero.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
@@ -89,7 +90,7 @@ class JointSafety:
 
 @dataclass(frozen=True)
 class JointRecording:
-    """Where and how a run is recorded."""
+    """Destination and format of a recording."""
 
     __pydantic_config__ = ConfigDict(extra="forbid")
     path: Path = Path("bag")
@@ -99,7 +100,7 @@ class JointRecording:
 
 @dataclass(frozen=True)
 class JointExperiment:
-    """Contents of an experiment's file."""
+    """Content of an experiment's file."""
 
     duration: float
     rate: float
@@ -115,30 +116,30 @@ class JointExperiment:
 
     @classmethod
     def load(cls, path: str | Path) -> "JointExperiment":
-        """The experiment in a YAML file. Raises InputError naming the line and key of what is wrong."""
+        """The experiment in a YAML file. Raises InputError with the line and key of an error."""
         return _experiment(read(path), Path(path).resolve())
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "JointExperiment":
-        """The experiment with the content of a file. Raises InputError naming the key of what is wrong."""
+        """The experiment with the content of a file. Raises InputError with the key of an error."""
         path = Path("experiment")
         return _experiment(parse(plain_yaml(content, path.name), path.name), path)
 
-    input_delay = measurement_delay = Delay()  # none by nodes: the joints' paths have theirs
+    input_delay = measurement_delay = Delay()  # no delays by nodes: the joints' paths contain them
 
     def with_record(self, **changes: Any) -> "JointExperiment":
-        """A copy that records otherwise."""
+        """A copy with other recording settings."""
         return replace(self, record=replace(self.record, **changes))
 
     def nodes(self) -> list[NodeSpec]:
-        """The graph of this experiment: excitation, plant, recorder. Raises InputError where it names no model."""
+        """The nodes of this experiment: excitation, plant, recorder. Raises InputError where it names no model."""
         from rhythmid.body.joint_graph import joint_nodes
 
         return joint_nodes(self)
 
     @property
     def count(self) -> int:
-        """Number of samples of every topic. Raises InputError where these are too few or too many."""
+        """Number of samples per topic. Raises InputError where there are too few or too many."""
         count = round(self.duration * self.rate)
         if not 1 < count <= MOST_RUN_SAMPLES:
             raise InputError(f"a run has 2 to {MOST_RUN_SAMPLES} samples, not {count}")
@@ -150,8 +151,8 @@ class JointExperiment:
         return round(1e9 / self.rate)
 
     def asked(self, machine: Machine) -> Array:
-        """Commands (n, joints), in the order of the machine's joints, faded in and out about the offsets. Raises InputError for a joint
-        that has no path."""
+        """Commands (n, joints), in the order of the machine's joints, faded in and out about the offsets. Raises
+        InputError for a joint without a path."""
         for joint in self.excitation:
             if joint not in machine.joints:
                 raise InputError(
@@ -166,7 +167,7 @@ class JointExperiment:
 
     def plant(self, machine: Machine) -> "JointPlant":
         """The machine at the experiment's start."""
-        from rhythmid.body.joint_plant import JointPlant  # the compiler behind it is slow to load
+        from rhythmid.body.joint_plant import JointPlant  # the compiler that it needs is slow to load
 
         first = dict(zip(machine.joints, self.asked(machine)[0].tolist()))
         driven = {joint: value for joint, value in first.items() if machine.controlled(joint)}
@@ -175,16 +176,16 @@ class JointExperiment:
 
 @dataclass(frozen=True)
 class JointMessages:
-    """What a run's topics carry: stamps int64[n] [ns], and for each topic the joints and columns (n, joints) by field."""
+    """Content of a run's topics: stamps int64[n] [ns], and for each topic the joints and columns (n, joints) by field."""
 
     stamp_ns: NDArray[np.int64]
     topics: Mapping[str, tuple[tuple[str, ...], Mapping[str, Array]]]
 
 
 def perform(machine: Machine, experiment: JointExperiment) -> JointMessages:
-    """Run an experiment: what the graph's run in lockstep carries, sample by sample and stamp by stamp.
+    """Run an experiment; the messages equal those of the ROS graph in lockstep mode.
 
-    Raises InputError for a joint that has no path, a run that is too long or that diverges.
+    Raises InputError for a joint without a path, or a run that is too long or diverges.
     """
     asked, plant = experiment.asked(machine), experiment.plant(machine)
     stamps = np.arange(experiment.count, dtype=np.int64) * experiment.period_ns
@@ -202,13 +203,13 @@ def perform(machine: Machine, experiment: JointExperiment) -> JointMessages:
 
 
 def command_field(machine: Machine) -> str:
-    """The field of a command's message: references are positions, forces efforts."""
+    """The field of a command message: position for references, effort for forces."""
     return "position" if any(machine.controlled(joint) for joint in machine.joints) else "effort"
 
 
 @dataclass(frozen=True)
 class _Excitation:
-    """What a joint is commanded, as it is written; the rest says of what kind it is."""
+    """The command of a joint as written in the file; further keys depend on its type."""
 
     offset: Number = 0.0
     limits: Range = (-math.inf, math.inf)
@@ -216,7 +217,7 @@ class _Excitation:
 
 @dataclass(frozen=True)
 class _Time:
-    """How a run goes, as it is written."""
+    """Timing of a run as written in the file."""
 
     __pydantic_config__ = ConfigDict(extra="forbid")
     mode: Literal["lockstep", "realtime"] = "lockstep"
@@ -226,7 +227,7 @@ class _Time:
 
 @dataclass(frozen=True)
 class _Experiment:
-    """An experiment as it is written."""
+    """An experiment as written in the file."""
 
     __pydantic_config__ = ConfigDict(extra="forbid")
     duration: Annotated[Number, Limits(ge=1e-6, le=1e6)]

@@ -1,6 +1,6 @@
-"""The graph of an experiment with a machine of several joints: excitation, plant and recorder.
+"""ROS graph of an experiment with a machine of several joints: excitation, plant and recorder.
 
-Delays of commands and measurements belong to the joints' paths, so that no node injects them.
+Delays of commands and measurements are in the joints' paths, so there are no delay injectors.
 """
 
 import json
@@ -56,7 +56,7 @@ def joint_nodes(experiment: JointExperiment) -> list[NodeSpec]:
 
 
 def description(experiment: JointExperiment) -> dict:
-    """What the topic `run` says: the experiment as run, without the machine, which is to be found."""
+    """Content of the topic `run`: the experiment as run, without the machine, which is to be identified."""
     return {
         "program": "rhythmid",
         "excitation": read(experiment.path).at("excitation").plain,
@@ -69,6 +69,6 @@ def description(experiment: JointExperiment) -> dict:
 
 
 def describes_joints(path: str | Path) -> bool:
-    """Whether an experiment's file is one of several joints: its `excitation` has a mapping for each."""
+    """Whether an experiment file is for several joints: its `excitation` has a mapping for each joint."""
     known = read(path).at("excitation").value
     return isinstance(known, dict) and "type" not in known

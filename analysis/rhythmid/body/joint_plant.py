@@ -1,8 +1,9 @@
-"""A machine of several joints fed command by command: what the plant node and the run without ROS have in common.
+"""A machine of several joints with commands as they arrive, used by the plant node and by the run without ROS.
 
-Time is whole nanoseconds since the start of the run. The result depends on the commands and their stamps alone, not on the chunks in
-which they are fed. A controller has held the pose of the start before its first reference comes. The effort of a sample is the mean over
-the sample period before it: at a sample's own instant a held reference jumps, and what the actuator gives there is not what it gives between.
+Time is whole nanoseconds since the start of the run. The result depends only on the commands and their stamps, not
+on the chunks in which they arrive. Until its first reference, a controller holds the start pose. The effort of a
+sample is the mean over the sample period before it. The reason: a held reference jumps at the sampling instant, so
+the actuator force at that instant differs from that between samples.
 """
 
 from collections.abc import Mapping
@@ -32,11 +33,11 @@ from rhythmid.simulation.transport import CommandPath, physical_times
 
 FIELDS = ("position", "velocity", "effort")
 Stamps = NDArray[np.int64]
-WHOLE = 1e-6  # of a step: to this the sample period is a whole number of steps
+WHOLE = 1e-6  # in steps: tolerance for the sample period to be a whole number of steps
 
 
 class JointPlant:
-    """A machine that runs.
+    """A running machine.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ class JointPlant:
 
     Attributes
     ----------
-    held : what the joints are commanded before the first command (joints,).
+    held : commands (joints,) of the joints before the first command.
     """
 
     def __init__(
@@ -81,22 +82,22 @@ class JointPlant:
         self._parameters = vector_of(machine.paths, layout)
         self._past = np.empty((rows_of(machine.paths, step), layout.pasts))
         self._late = [_Transport(model) for model in machine.paths.values()]
-        self._knots = np.empty((0, len(places)))  # when commands act at each joint
+        self._knots = np.empty((0, len(places)))  # times at which commands act at each joint
         self._levels = np.empty((0, len(places)))
         self._noise = [samplers(model, seed + place) for place, model in enumerate(machine.paths.values())]
-        self._next = self._done = 0  # the next sample of the grid, and the next step
+        self._next = self._done = 0  # next sample of the grid, and next step
         self._rows = np.empty((0, len(COLUMNS) * len(places) + self._model.nq + self._model.nv))
-        self._latest = np.full(len(places), -np.inf)  # when the newest measurements were taken
+        self._latest = np.full(len(places), -np.inf)  # times at which the newest measurements were taken
         self._newest = -1
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The joints that are commanded, in the order of a command's numbers."""
+        """The commanded joints, in the order of a command's numbers."""
         return self._machine.joints
 
     @property
     def measured(self) -> tuple[str, ...]:
-        """The joints that are measured: the commanded ones, and that of the base where it moves along one."""
+        """The measured joints: the commanded ones, and that of the base where the base moves along one."""
         base = self._machine.body.base
         return (*self.joints, base) if base in self._machine.body.joints else self.joints
 
@@ -120,7 +121,8 @@ class JointPlant:
         self.push_many(np.array([stamp_ns], dtype=np.int64), np.asarray(command)[None, :])
 
     def advance(self, until_ns: int) -> tuple[Stamps, JointTrajectory | None]:
-        """Stamps and samples of the grid up to `until_ns` that have not been given out; every command stamped up to then is known.
+        """Stamps and samples of the grid up to `until_ns` that have not been returned yet; all commands stamped up
+        to then must be known.
 
         Raises InputError when the machine diverges.
         """
@@ -142,7 +144,7 @@ class JointPlant:
         return stamps, made
 
     def states(self, until_ns: int) -> tuple[Stamps, dict[str, Array]]:
-        """What `advance` gives as the columns (n, measured joints) of joint states: position, velocity and effort."""
+        """Result of `advance` as the columns (n, measured joints) of joint states: position, velocity and effort."""
         stamps, made = self.advance(until_ns)
         if made is None:
             return stamps, {name: np.empty((0, len(self.measured))) for name in FIELDS}
@@ -156,7 +158,8 @@ class JointPlant:
         return stamps, states
 
     def _run(self, last: int) -> None:
-        """Steps up to the number `last`, whose begin is told and which is taken with the next run."""
+        """Simulate the steps up to the number `last`. The start of that step is returned; the step is made in the
+        next run."""
         count = last + 1 - self._done
         edges = self._begin + self._step * np.arange(self._done, last + 2)
         command = np.empty((count, len(self.held)))
@@ -175,13 +178,13 @@ class JointPlant:
         if len(self._knots):
             gone = (
                 int(np.sum(self._knots.max(axis=1) <= edges[-2])) - 1
-            )  # another one acts already, everywhere
+            )  # another command already acts at all joints
             if gone > 0:
                 self._knots, self._levels = self._knots[gone:], self._levels[gone:]
 
 
 class _Transport:
-    """When commands act at a joint and its measurements are taken; nothing is computed where nothing delays."""
+    """Times at which commands act at a joint and measurements are taken; nothing is computed without delays."""
 
     def __init__(self, model: Model) -> None:
         self._model, self._path = model, CommandPath(model)
@@ -189,16 +192,17 @@ class _Transport:
         self._command, self._measurement = "command" in slots, bool({"sensor", "timing"} & set(slots))
 
     def acting(self, stamps: Array) -> Array:
-        """When commands with these stamps [s] act."""
+        """Times [s] at which commands with these stamps [s] act."""
         return self._path.times(stamps) if self._command else stamps
 
     def physical(self, stamps: Array) -> Array:
-        """When measurements with these stamps [s] are taken."""
+        """Times [s] at which measurements with these stamps [s] are taken."""
         return physical_times(self._model, stamps) if self._measurement else stamps
 
 
 def resting(machine: Machine, pose: Array) -> Array:
-    """What joints are commanded before the first command (joints,): a controller holds the pose, without one there is no force."""
+    """Commands (joints,) before the first command: a controller holds the pose; without a controller there is no
+    force."""
     return np.array(
         [
             pose[machine.body.joints[joint].position] if machine.controlled(joint) else 0.0

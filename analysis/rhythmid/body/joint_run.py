@@ -1,4 +1,4 @@
-"""An experiment with a machine of several joints run without ROS, as a record and as a bag."""
+"""An experiment with a machine of several joints, run without ROS, as a record and as a bag."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class JointRun(Result):
-    """A simulated experiment with a machine: `messages` are what its topics carry."""
+    """A simulated experiment with a machine: `messages` are the content of its topics."""
 
     machine: Machine
     experiment: JointExperiment
@@ -28,7 +28,7 @@ class JointRun(Result):
 
     @property
     def record(self) -> JointRecord:
-        """The run as `load` reads it from its bag."""
+        """The run in the form in which `load` reads it from its bag."""
         time = (self.messages.stamp_ns * 1e-9).astype(np.float64)
         (_, command), (joints, states) = (
             self.messages.topics[f"{self.experiment.namespace}/{name}"]
@@ -54,7 +54,7 @@ class JointRun(Result):
         return f"{len(self.messages.stamp_ns)} samples"
 
     def save(self, path: str | Path) -> Path:
-        """Write the bag that the graph would record. Raises InputError where the path exists or cannot be written."""
+        """Write the bag that the ROS graph would record. Raises InputError where the path exists or cannot be written."""
         stamps = self.messages.stamp_ns
         return write_joint_bag(
             Path(path), {topic: (stamps, *rest) for topic, rest in self.messages.topics.items()}
@@ -68,7 +68,7 @@ class JointRun(Result):
         return {"samples": len(self.messages.stamp_ns), "topics": list(self.messages.topics)}
 
     def tables(self) -> Mapping[str, Sequence[Row]]:
-        """The `topics`, with the joints that each carries."""
+        """The `topics`, with the joints in each."""
         return {
             "topics": [
                 {"topic": topic, "joints": ", ".join(joints)}
@@ -78,7 +78,7 @@ class JointRun(Result):
 
 
 def run_experiment(machine: Machine, experiment: Mapping[str, Any] | str | Path) -> JointRun:
-    """Run an experiment, in a file or as the content of one. Raises InputError as `perform` does.
+    """Run an experiment, given as a file or as its content. Raises InputError as `perform` does.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""MuJoCo's C functions, for compiled loops: called by their names in the shared library, without a crossing into Python."""
+"""MuJoCo's C functions for compiled loops: called by name in the shared library, without calls into Python."""
 
 from pathlib import Path
 
@@ -39,7 +39,7 @@ def numbers_at(_, address):
 def inverse_along(
     model, data, at_position, at_velocity, at_acceleration, force, position, velocity, acceleration, out
 ):
-    """Forces `out` (n, nv) along a motion; the four vectors in the middle are those of `data`."""
+    """Forces `out` (n, nv) along a motion; `at_position` to `force` are the vectors of `data`."""
     for k in range(position.shape[0]):
         at_position[:] = position[k]
         at_velocity[:] = velocity[k]

@@ -1,7 +1,7 @@
-"""The inertia of one link, in numbers that add up, and the place where a link ends.
+"""Inertia of one link in ten additive parameters, and the position of a link's end.
 
-Ten numbers: the mass, the mass times the centre's place (3), and the inertia about the link's frame (xx, yy, zz, xy, xz, yz). Those of two
-bodies that are fixed to each other are the sum of both.
+The ten parameters: the mass, the mass times the position of the centre (3), and the inertia about the link's frame
+(xx, yy, zz, xy, xz, yz). For two bodies that are fixed to each other they add up.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Principal:
-    """Inertia of a link as MuJoCo has it: mass, principal moments (3,), the centre's place (3,), and the axes as a quaternion (w, x, y, z)."""
+    """Inertia of a link in MuJoCo's form: mass, principal moments (3,), position of the centre (3,), and the axes
+    as a quaternion (w, x, y, z)."""
 
     mass: float
     moments: Array
@@ -28,7 +29,7 @@ class Principal:
 
     @classmethod
     def of(cls, model: Any, link: int) -> "Principal":
-        """That of a link of a compiled model."""
+        """The inertia of a link of a compiled model."""
         return cls(
             float(model.body_mass[link]),
             model.body_inertia[link].copy(),
@@ -38,42 +39,42 @@ class Principal:
 
     @classmethod
     def from_ten(cls, ten: Array) -> "Principal":
-        """The one that has these ten numbers (10,); the mass is positive."""
+        """The inertia with these ten parameters (10,); the mass is positive."""
         mass, centre = float(ten[0]), ten[1:4] / ten[0]
         xx, yy, zz, xy, xz, yz = ten[4:]
         about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         moments, axes = np.linalg.eigh(about - _of_point(mass, centre))
-        axes[:, 2] *= np.sign(np.linalg.det(axes))  # a turn, not a reflection
+        axes[:, 2] *= np.sign(np.linalg.det(axes))  # a rotation, not a reflection
         return cls(mass, moments, centre, np.roll(Rotation.from_matrix(axes).as_quat(), 1))
 
     @property
     def ten(self) -> Array:
-        """The ten numbers (10,)."""
+        """The ten parameters (10,)."""
         axes = Rotation.from_quat(np.roll(self.turn, -1)).as_matrix()
         about = axes @ np.diag(self.moments) @ axes.T + _of_point(self.mass, self.centre)
         return _joined(self.mass, self.centre, about)
 
     def about(self, axis: Array) -> float:
-        """Moment of inertia about an axis (3,), of unit length, through the centre."""
+        """Moment of inertia about an axis (3,) of unit length through the centre."""
         along = Rotation.from_quat(np.roll(self.turn, -1)).as_matrix().T @ axis
         return float(self.moments @ along**2)
 
     def turned(self, axis: Array, inertia: float) -> "Principal":
-        """One with this moment about an axis (3,) through the centre. All moments change by the same factor, so that they are still those of a
-        body; where there are none, they are those of a ball."""
+        """The inertia with this moment about an axis (3,) through the centre. All moments are scaled by one factor,
+        so they remain physically consistent; where this moment is zero, they become those of a ball."""
         known = self.about(axis)
         moments = self.moments * (inertia / known) if known > 0.0 else np.full(3, inertia)
         return replace(self, moments=moments)
 
     def put_into(self, model: Any, link: int) -> None:
-        """Give a link of a compiled model this inertia."""
+        """Set the inertia of a link of a compiled model."""
         model.body_mass[link], model.body_inertia[link] = self.mass, self.moments
         model.body_ipos[link], model.body_iquat[link] = self.centre, self.turn
 
 
 @dataclass(frozen=True, eq=False)
 class Hinge:
-    """A hinge in the frame of a link that it turns: its place (3,) and its axis (3,), of unit length."""
+    """A hinge in the frame of a link that it rotates: its position (3,) and its axis (3,) of unit length."""
 
     place: Array
     axis: Array
@@ -84,7 +85,7 @@ class Hinge:
 
 
 def hinges(model: Any, links: Mapping[str, int]) -> dict[str, Hinge]:
-    """Of those links that turn, the nearest hinge that turns each."""
+    """For each rotating link, the nearest hinge that rotates it."""
     mj = mujoco()
     data = quiet_data(model)
     mj.mj_kinematics(model, data)
@@ -102,7 +103,7 @@ def hinges(model: Any, links: Mapping[str, int]) -> dict[str, Hinge]:
 
 
 def point_mass(place: Array) -> Array:
-    """The ten numbers (10,) of 1 kg at a place (3,) of a link's frame."""
+    """The ten parameters (10,) of 1 kg at a position (3,) in a link's frame."""
     return _joined(1.0, place, _of_point(1.0, place))
 
 
@@ -111,15 +112,16 @@ def _joined(mass: float, centre: Array, about: Array) -> Array:
 
 
 def _of_point(mass: float, place: Array) -> Array:
-    """Inertia (3, 3) about the frame of a mass at a place (3,)."""
+    """Inertia (3, 3) about the frame of a mass at a position (3,)."""
     return mass * (place @ place * np.eye(3) - np.outer(place, place))
 
 
 def end_links(model: Any, links: dict[str, int]) -> dict[str, Array]:
-    """The links at the ends of the chains, and the place (3,) in the frame of each at which it ends.
+    """The links at the ends of the chains, and the position (3,) of each link's end in its frame.
 
-    That is the farthest from its joint of what the file shows of the link and of what is fixed to it: frames, sites and the middles of the
-    faces of its shapes' boxes. Where the file shows nothing, it is twice as far as the centre of mass, as in a uniform rod.
+    It is the point farthest from the link's joint among the features of the link and of everything fixed to it:
+    frames, sites and the centres of the faces of its shapes' bounding boxes. Without features, it is twice as far
+    as the centre of mass, as for a uniform rod.
     """
     mj = mujoco()
 
@@ -143,7 +145,7 @@ def end_links(model: Any, links: dict[str, int]) -> dict[str, Array]:
 
 
 def _shown(model: Any, data: Any, root: int) -> list[Array]:
-    """Places of the world of what a file shows of the links that are fixed to `root`."""
+    """World positions of the features of the links that are fixed to `root`."""
     group = model.body_weldid
     own = [body for body in range(1, model.nbody) if group[body] == root]
     shown = [data.xpos[body] for body in own if body != root]

@@ -1,7 +1,8 @@
-"""One step of the joints' paths as source text, for a loop that is somebody else's: what is before `mj_step`.
+"""Source text of one step of the joints' paths for a user's own simulation loop: the part before `mj_step`.
 
-Everything that lasts from step to step stands in MuJoCo's own `userdata`, so that a reset, a copy or a saved state of the data has the
-elements with it: the number of the next step and one (0: not begun), the time at the begin, the states, and the past of signals.
+All variables that persist between steps are in MuJoCo's own `userdata`. So a reset, a copy or a saved state of the
+data includes the elements: the number of the next step plus one (0: not begun), the start time, the states, and
+past values of signals.
 """
 
 import math
@@ -16,7 +17,7 @@ ARRAYS = ("qpos", "qvel", "applied", "damping", "control", "memory")
 
 
 def rows_of(paths: Mapping[str, Model], step: float) -> int:
-    """Steps whose signals are kept: those of the longest dead time, the present one, and one to interpolate with."""
+    """Number of stored steps of signals: those of the longest dead time, the present one, and one for interpolation."""
     longest = max(
         (
             value.value
@@ -31,12 +32,13 @@ def rows_of(paths: Mapping[str, Model], step: float) -> int:
 
 
 def numbers_of(layout: Layout, rows: int) -> int:
-    """Numbers that have to last from step to step."""
+    """Number of values that persist between steps."""
     return HEAD + len(layout.states) + layout.pasts * rows
 
 
 def generate_live(paths: Mapping[str, Model]) -> tuple[Module, Layout]:
-    """The module whose `run` does what is before a step, and the layout of its arrays; `run` returns whether it first wants to begin."""
+    """The module whose `run` performs the part before a step, and the layout of its arrays; `run` returns whether
+    it needs initialisation first."""
     writer, kernels = written(paths, live=True)
     layout = writer.layout
     states = len(layout.states)

@@ -1,4 +1,4 @@
-"""A machine of several joints: a body, and along every joint the path of elements that a machine of one axis has.
+"""A machine of several joints: a body, and for every joint a path of elements like that of a machine with one axis.
 
     body: {mjcf: leg.xml, base: rail, step: 0.00025, contacts: true}     # or urdf:; base: fixed | free | a joint
     joints:
@@ -8,10 +8,11 @@
         force:    [{coulomb_friction: {force: 0.3, transition: 0.02}}]
       hip: {}
 
-A joint's path is a `Model` whose inertia is the body's: the one that a force along the joint meets at the reference pose. Damping
-and dry friction that the file gives a joint become the elements of that name, where the path has none. `free:` under `body:`
-names inertial parameters that are estimated: `free: {shank.mass: {prior: {mean: 0.4, std: 0.04}}, shank.payload: {}, knee.armature: {}}`.
-A payload sits at the end of its link, for which `ends: {shank: [0, 0, -0.2]}` may give another place [m] in the link's frame.
+A joint's path is a `Model` with the body's inertia: the effective inertia of the joint at the reference pose.
+Damping and dry friction of a joint in the file become the elements of that name, where the path has none. `free:`
+under `body:` names the inertial parameters to estimate: `free: {shank.mass: {prior: {mean: 0.4, std: 0.04}},
+shank.payload: {}, knee.armature: {}}`. A payload is at the end of its link; `ends: {shank: [0, 0, -0.2]}` gives
+another position [m] in the link's frame.
 """
 
 import os
@@ -41,10 +42,9 @@ from rhythmid.validation import Number, validated
 from rhythmid.value import Value, entry_of, value_of
 
 KINDS = ("mjcf", "urdf")
-LONGEST_STEP = 0.01  # [s] of an integration: ten times what contacts bear
-TRANSITION = (
-    0.01  # [rad/s or m/s] over which the dry friction of a body's file turns, which MuJoCo holds for a jump
-)
+LONGEST_STEP = 0.01  # [s] largest integration step: ten times the largest step for stable contacts
+# [rad/s or m/s] transition speed for the dry friction of a body's file, which is a jump in MuJoCo
+TRANSITION = 0.01
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,10 @@ class Machine:
 
     Attributes
     ----------
-    body : with the parameters that `inertial` says.
+    body : with the parameters in `inertial`.
     paths : by joint, in the order of the file; the inertia of each is borrowed from the body and fixed.
-    inertial : inertial parameters that the file mentions, by "link.mass", "link.inertia", "link.payload" or "joint.armature".
-    kind : "mjcf" or "urdf", what the body's file is.
+    inertial : inertial parameters in the file, by "link.mass", "link.inertia", "link.payload" or "joint.armature".
+    kind : format of the body's file, "mjcf" or "urdf".
     """
 
     body: MujocoBody
@@ -66,18 +66,18 @@ class Machine:
 
     @classmethod
     def load(cls, path: str | Path, catalogue: Catalogue | None = None) -> "Machine":
-        """The machine in a YAML file. Raises InputError naming line, parameter and unit of what is wrong."""
+        """The machine in a YAML file. Raises InputError with line, parameter and unit of an error."""
         known = load_catalogue() if catalogue is None else catalogue
         return _machine(read(path), Path(path).resolve().parent, known)
 
     @classmethod
     def from_text(cls, text: str, folder: Path, catalogue: Catalogue, path: str = "model.yaml") -> "Machine":
-        """The machine in a YAML text that stands for the file `path` in a folder."""
+        """The machine in a YAML text; `path` is the file name used in messages, `folder` its folder."""
         return _machine(parse(text, path), folder, catalogue)
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The joints that have a path, in the file's order."""
+        """The joints with a path, in the file's order."""
         return tuple(self.paths)
 
     def controlled(self, joint: str) -> bool:
@@ -86,8 +86,8 @@ class Machine:
 
     @cached_property
     def parameters(self) -> dict[str, Value]:
-        """All parameters: "joint.element.parameter", and "body.link.mass", "body.link.inertia", "body.link.payload" and "body.joint.armature" of those
-        that the file mentions."""
+        """All parameters: "joint.element.parameter", and "body.link.mass", "body.link.inertia", "body.link.payload" and
+        "body.joint.armature" for those in the file."""
         found = {f"{BODY}.{name}": value for name, value in self.inertial.items()}
         for joint, model in self.paths.items():
             found |= {f"{joint}.{n}": v for n, v in model.parameters.items() if n != INERTIA}
@@ -138,13 +138,15 @@ class Machine:
         return self.with_path(joint, self.paths[joint].with_element(element, values, fixed))
 
     def with_inertial(self, values: Mapping[str, float]) -> "Machine":
-        """A copy with inertial parameters "link.mass", "link.inertia", "link.payload" or "joint.armature", which the file need not mention, of these values."""
+        """A copy with these values of inertial parameters "link.mass", "link.inertia", "link.payload" or
+        "joint.armature", which need not be in the file."""
         known = {name: self._inertial(name, value) for name, value in values.items()}
         mentioned = replace(self, inertial={**self.inertial, **known})
         return mentioned.with_values({f"{BODY}.{name}": value for name, value in values.items()})
 
     def with_payload(self, link: str, mass: float, place: Array) -> "Machine":
-        """A copy whose link carries a point mass [kg] at a place (3,) [m] of its frame. Raises InputError for a link within a chain."""
+        """A copy whose link carries a point mass [kg] at a position (3,) [m] in its frame. Raises InputError for a
+        link within a chain."""
         return replace(self, body=self.body.with_ends({link: place})).with_inertial(
             {f"{link}.{PAYLOAD}": mass}
         )
@@ -156,11 +158,11 @@ class Machine:
         return Value(value, units.of(parameter.unit), fixed, parameter.bounds)
 
     def _loaded(self) -> list[str]:
-        """The links whose payload the file mentions."""
+        """The links with a payload in the file."""
         return [owner for owner, kind in map(split, self.inertial) if kind == PAYLOAD]
 
     def to_yaml(self, beside: Path | None = None) -> str:
-        """The machine as YAML text that `load` reads back from a file in the folder `beside`."""
+        """The machine as YAML text for a file in the folder `beside`; `load` is the inverse."""
         path = self.body.path if beside is None else Path(os.path.relpath(self.body.path, beside))
         body: dict[str, Any] = {self.kind: str(path), "base": self.body.base}
         body |= {"step": self.body.step, "contacts": self.body.contacts}
@@ -183,7 +185,7 @@ class Machine:
         return yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
 
     def save(self, path: str | Path) -> None:
-        """Write the machine; nothing is left half-written. Raises InputError when the place is not writable."""
+        """Write the machine, completely or not at all. Raises InputError when the location is not writable."""
         write_text(Path(path), self.to_yaml(Path(path).resolve().parent))
 
 
@@ -220,7 +222,7 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
     body = body.with_losses(name for name in body.joints if name not in given)
     free = keys[BODY].mapping().get("free")
     inertial = {} if free is None else _free(free, body)
-    # an inertia that is mentioned is one of its own, which a mass leaves as it is
+    # a given inertia is independent of the mass
     changed = {
         n: v.value for n, v in inertial.items() if v.value != body.parameters[n] or split(n)[1] == TURNING
     }
@@ -232,7 +234,7 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
 
 @dataclass(frozen=True)
 class _Body:
-    """A body as it is written."""
+    """A body as written in the file."""
 
     __pydantic_config__ = ConfigDict(extra="forbid")
     mjcf: str | None = None
@@ -275,7 +277,7 @@ def _free(node: Node, body: MujocoBody) -> dict[str, Value]:
 
 
 def _path(node: Node, joint: str, body: MujocoBody, catalogue: Catalogue) -> Model:
-    """The path of one joint, with the file's damping and dry friction where it has none of its own."""
+    """The path of one joint, with the damping and dry friction of the body's file where it has none of its own."""
     sections = {} if node.value is None else node.mapping(SLOTS)
     units = ROTATIONAL if body.joints[joint].rotational else TRANSLATIONAL
     mass = {"value": body.effective_inertia(joint), "unit": units.mass, "fixed": True}

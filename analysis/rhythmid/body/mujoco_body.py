@@ -1,4 +1,4 @@
-"""A body that an MJCF or URDF file describes and MuJoCo integrates.
+"""A body described by an MJCF or URDF file and integrated by MuJoCo.
 
 E. Todorov, T. Erez, Y. Tassa, MuJoCo: a physics engine for model-based control, IROS 2012.
 """
@@ -28,14 +28,14 @@ from rhythmid.body.robot_file import (
 )
 from rhythmid.errors import InputError
 
-HEAVIEST = 1e6  # [kg] a link with a larger mass is a mistake
-AS_THE_LINK = np.array([1.0, 0.0, 0.0, 0.0])  # axes that are turned as the link's frame is
-WEIGHTLESS = 1e-10  # [kg] links that weigh less together have no mass but `LEAST_MASS` each
+HEAVIEST = 1e6  # [kg] a larger mass of a link is a mistake
+AS_THE_LINK = np.array([1.0, 0.0, 0.0, 0.0])  # axes aligned with the link's frame
+WEIGHTLESS = 1e-10  # [kg] if all links together weigh less, they have no mass other than `LEAST_MASS`
 
 
 @dataclass(frozen=True, eq=False)
 class MujocoBody(Body):
-    """A compiled file. `model` belongs to it alone and is never changed: those who run it take a copy, see `worker`."""
+    """A compiled file. `model` belongs to this object and is never changed; runs use a copy, see `worker`."""
 
     path: Path
     model: Any
@@ -47,9 +47,9 @@ class MujocoBody(Body):
     given: Mapping[str, float] = field(default_factory=dict)
     ends: Mapping[str, Array] = field(
         default_factory=dict
-    )  # of links that may carry a payload, its place (3,) in their frames
-    notes: tuple[str, ...] = ()  # in words, what of the file was left out or changed
-    hold: Mapping[str, float] = field(default_factory=dict)  # positions of the file's joints that are held
+    )  # for links that may carry a payload, its position (3,) in their frames
+    notes: tuple[str, ...] = ()  # parts of the file that were left out or changed, in words
+    hold: Mapping[str, float] = field(default_factory=dict)  # positions of the file's joints that are fixed
 
     @classmethod
     def load(
@@ -60,9 +60,10 @@ class MujocoBody(Body):
         contacts: bool = True,
         hold: Mapping[str, float] | None = None,
     ) -> "MujocoBody":
-        """The body in a file, some of its joints held fast. Raises InputError where MuJoCo refuses the file, or `base` is no joint of it.
+        """The body in a file, with some of its joints fixed. Raises InputError where MuJoCo rejects the file, or
+        `base` is no joint of it.
 
-        The file's viscous damping and dry friction of joints are taken out of it, see `passive`; its actuators are switched off.
+        Viscous damping and dry friction of the file's joints are removed, see `passive`; its actuators are disabled.
         """
         mj, path = mujoco(), Path(path)
         robot = read_robot(path, base, contacts, hold)
@@ -104,7 +105,8 @@ class MujocoBody(Body):
         return replace(made, ends=end_links(model, made.links))
 
     def with_losses(self, joints: Iterable[str]) -> "MujocoBody":
-        """A copy in which these joints, which have no path, lose again what the file says: a rail on which the base slides."""
+        """A copy with the file's losses restored in these joints, which have no path: for example a rail on which
+        the base slides."""
         model = copy.copy(self.model)
         for name in joints:
             dof, known = self.joints[name].velocity, self.passive[name]
@@ -112,7 +114,7 @@ class MujocoBody(Body):
         return replace(self, model=model)
 
     def worker(self) -> tuple[Any, Any]:
-        """A model and the data of a run, for one thread."""
+        """A model and the data of a run, for use in one thread."""
         model = copy.copy(self.model)
         return model, quiet_data(model)
 
@@ -124,7 +126,7 @@ class MujocoBody(Body):
 
     @cached_property
     def links(self) -> dict[str, int]:
-        """Numbers of the links that move, by name."""
+        """Indices of the moving links, by name."""
         return {
             self.model.body(i).name: i
             for i in range(1, self.model.nbody)
@@ -143,11 +145,11 @@ class MujocoBody(Body):
 
     @cached_property
     def hinges(self) -> dict[str, Hinge]:
-        """Of the links that turn, the nearest hinge that turns each."""
+        """For each rotating link, the nearest hinge that rotates it."""
         return hinges(self.model, self.links)
 
     def about_hinge(self, link: str) -> float:
-        """Moment of inertia [kg*m^2] of a link, without its payload, about the hinge that turns it."""
+        """Moment of inertia [kg*m^2] of a link, without its payload, about the hinge that rotates it."""
         own, hinge = self.own(link), self.hinges[link]
         return own.about(hinge.axis) + own.mass * hinge.distance(own.centre) ** 2
 
@@ -192,7 +194,8 @@ class MujocoBody(Body):
         return replace(self, model=model, given=given)
 
     def with_ends(self, places: Mapping[str, Array]) -> "MujocoBody":
-        """A copy in which payloads of links sit at these places (3,) of their frames. Raises InputError for a link that carries none."""
+        """A copy with payloads at these positions (3,) in the links' frames. Raises InputError for a link that
+        carries none."""
         for link in places:
             if link not in self.ends:
                 raise InputError(
@@ -232,23 +235,23 @@ class MujocoBody(Body):
                 made[:, :, place] = self._of_one(self.links[owner], ball, motion)
             else:
                 own = self.own(owner)
-                if f"{owner}.{TURNING}" in self.given:  # which the mass leaves as it is
+                if f"{owner}.{TURNING}" in self.given:  # it is independent of the mass
                     own = replace(own, moments=np.zeros(3))
                 made[:, :, place] = self._of_one(self.links[owner], own, motion) / own.mass
         return made
 
     def _of_one(self, link: int, inertia: Principal, motion: tuple[Array, Array, Array]) -> Array:
-        """Forces (n, nv) for one link of this inertia, the others without any."""
+        """Forces (n, nv) for one link with this inertia and the others without any."""
         model, data = self.worker()
         for one in (model.body_mass, model.body_inertia, model.jnt_stiffness, model.dof_damping):
             one[:] = 0.0
-        model.dof_armature[:] = 1.0  # MuJoCo factors the inertia matrix in any case
+        model.dof_armature[:] = 1.0  # MuJoCo always factorises the inertia matrix
         inertia.put_into(model, link)
         return self._along(model, data, *motion) - motion[2]
 
     def inertial_columns(self, link: str, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Columns (n, nv, 10) of a link's mass, mass times the centre's place (3), and inertia about the link's frame (xx, yy,
-        zz, xy, xz, yz), in all of which inverse dynamics is linear."""
+        """Columns (n, nv, 10) of a link's mass, mass times position of the centre (3), and inertia about the link's
+        frame (xx, yy, zz, xy, xz, yz); inverse dynamics is linear in all of them."""
         number = self.links[link]
         motion = position, velocity, acceleration
 
@@ -264,7 +267,7 @@ class MujocoBody(Body):
             others = [main[other] for other in range(3) if other != axis]
             first.append(made(1.0, unit[axis], origin) - weight - others[0] - others[1])
         mixed = []
-        eighth = np.pi / 8.0  # half of a turn by 45 degrees, as in a quaternion
+        eighth = np.pi / 8.0  # half of a 45 degree rotation, as in a quaternion
         for (one, other), axis, sign in (((0, 1), 2, 1.0), ((0, 2), 1, -1.0), ((1, 2), 0, 1.0)):
             turn = np.concatenate([[np.cos(eighth)], sign * np.sin(eighth) * unit[axis]])
             turned = made(0.0, origin, unit[one], turn)
@@ -272,7 +275,7 @@ class MujocoBody(Body):
         return np.stack([weight, *first, *main, *mixed], axis=2)
 
     def inertial(self, link: str) -> Array:
-        """The ten parameters of a link to which `inertial_columns` belong."""
+        """The ten parameters (10,) of a link, in the order of `inertial_columns`."""
         return Principal.of(self.model, self.links[link]).ten
 
     def _along(self, model: Any, data: Any, position: Array, velocity: Array, acceleration: Array) -> Array:
@@ -289,7 +292,7 @@ class MujocoBody(Body):
 
     @cached_property
     def reference(self) -> Array:
-        """The pose (nq,) at which inertias are borrowed: the first key frame, else the file's own."""
+        """The pose (nq,) for the borrowed inertias: the first key frame, else the file's default pose."""
         return np.array(self.model.key_qpos[0] if self.model.nkey else self.model.qpos0)
 
     def effective_inertia(self, joint: str) -> float:

@@ -1,4 +1,4 @@
-"""What a signal was some steps ago."""
+"""Past values of a signal."""
 
 import math
 
@@ -7,9 +7,10 @@ from numba import njit
 
 @njit("float64(float64[:, ::1], int64, int64, float64)", cache=True, error_model="numpy")
 def earlier(past, column, now, steps):
-    """Value `steps` before step `now` of a column, between steps on a straight line; before the first it was as there.
+    """Value of a column `steps` before step `now`, by linear interpolation between steps; before the first step its
+    first value.
 
-    The rows go round: row k % n holds step k, so that n - 1 steps back are known.
+    The rows form a ring buffer: row k % n holds step k, so n - 1 steps back are available.
     """
     at = max(now - max(steps, 0.0), 0.0)
     step, rows = math.floor(at), past.shape[0]

@@ -1,9 +1,10 @@
-"""The paths of all joints as source text: what one step of the body is given.
+"""Source text of the paths of all joints: their forces and damping for one step of the body.
 
-At the begin of a step every joint's path gives a force along it, which the step holds. Damping and friction, forces F(x, v) that
-oppose the motion, are coupled by their secant: with D = (F(x, 0) - F(x, v)) / v >= 0 the step takes F(x, 0) as force and D as the
-joint's damping, which MuJoCo integrates implicitly in the new velocity. So they stay stable however strong they are. Elements with
-states take one explicit step with their rates at its begin. A constraint is no part of a path here: MuJoCo has it, see `soft_constraint`.
+At the start of a step every joint's path gives a force, which is held during the step. Damping and friction are
+forces F(x, v) that oppose the motion. They are coupled by their secant: with D = (F(x, 0) - F(x, v)) / v >= 0 the
+step takes F(x, 0) as force and D as the joint's damping, which MuJoCo integrates implicitly in the new velocity. So
+they are stable for any size. Elements with states take one explicit step with their rates at its start. A
+constraint is not part of a path here: MuJoCo includes it, see `soft_constraint`.
 """
 
 from collections.abc import Mapping
@@ -15,15 +16,15 @@ from rhythmid.model import INERTIA, Model, Term
 from rhythmid.simulation.kernel_source import kernel_module
 from rhythmid.simulation.machine_code import Module
 
-REST = 1e-9  # [rad/s or m/s] below which the secant is taken at this speed
-TRANSPORT = ("input_delay", "measurement_delay")  # by which a live run can delay
+REST = 1e-9  # [rad/s or m/s] speed for the secant at lower speeds
+TRANSPORT = ("input_delay", "measurement_delay")  # delays that a live run can include
 COLUMNS = ("position", "velocity", "output", "effort")  # of each joint in a row of the result
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where everything stands: `parameters[i]` is (joint, name, value where the path lacks it) of the parameter vector's entry i;
-    `states` are (joint, "element.state"); `pasts` signals whose past is kept."""
+    """Positions in the arrays: `parameters[i]` is (joint, name, value where the path lacks it) of the parameter
+    vector's entry i; `states` are (joint, "element.state"); `pasts` the signals whose past is stored."""
 
     parameters: tuple[tuple[str, str, float | None], ...]
     states: tuple[tuple[str, str], ...]
@@ -34,9 +35,10 @@ class Layout:
 class Writer:
     """Collects parameters, states and lines while walking along the joints' paths.
 
-    The lines use: `qpos`, `qvel`, `damping`, `applied`, and the joints' places `at_position`, `at_velocity` in them; `k` steps since
-    the start, `h` their length, `t` the time; `command[row, joint]`, `out[row, …]`, and where a run is not `live`, `forcing` like it; `past`.
-    A live run has its transport delays in it: what it is given and what it says are of now.
+    The lines use: `qpos`, `qvel`, `damping`, `applied`, and the joints' indices `at_position`, `at_velocity` in
+    them; `k` steps since the start, `h` their length, `t` the time; `command[row, joint]`, `out[row, …]`, and where
+    a run is not `live`, `forcing` in the same form; `past`. A live run includes its transport delays: its arguments
+    and results refer to the present time.
     """
 
     parameters: dict[tuple[str, str], float | None] = field(default_factory=dict)
@@ -49,26 +51,26 @@ class Writer:
 
     @property
     def layout(self) -> Layout:
-        """Where everything stands."""
+        """Positions in the arrays."""
         parameters = tuple((joint, name, default) for (joint, name), default in self.parameters.items())
         return Layout(parameters, tuple(self.states), self.pasts)
 
     @property
     def before(self) -> list[str]:
-        """Lines that take parameters and states out of their arrays."""
+        """Lines that read parameters and states from their arrays."""
         known = [f"p{i} = parameters[{i}]" for i in range(len(self.parameters))]
         return known + [f"s{i} = states[{i}]" for i in range(len(self.states))]
 
     @property
     def after(self) -> list[str]:
-        """Lines that carry the states over the step."""
+        """Lines that advance the states by one step."""
         return [
             f"s{i} = d{i}" if i in self.memories else f"s{i} = s{i} + h * d{i}"
             for i in range(len(self.states))
         ]
 
     def parameter(self, name: str, default: float | None = None) -> str:
-        if name in (STEP, ELAPSED):  # a memory has had a whole step since it was last asked
+        if name in (STEP, ELAPSED):  # a memory state is updated once per whole step
             return "h"
         known = self.parameters.setdefault((self.joint, name), default)
         if known is None or default is None:
@@ -76,7 +78,7 @@ class Writer:
         return f"p{list(self.parameters).index((self.joint, name))}"
 
     def call(self, term: Term, arguments: list[str], result: str) -> None:
-        """Evaluate an element at the begin of the step; its states' rates are kept for the end."""
+        """Evaluate an element at the start of the step; its states' rates are stored for the end."""
         element = term.element
         values = [self.parameter(f"{term.label}.{one.name}") for one in element.parameters]
         values += [self.parameter(source, default) for source, default in element.borrows.values()]
@@ -96,7 +98,7 @@ class Writer:
         self.lines.append(f"{', '.join([result, *rates])} = {call}")
 
     def past(self, term: Term, value: str) -> str:
-        """What a signal was before the element's dead time, between the steps on a straight line."""
+        """A signal before the element's dead time, by linear interpolation between steps."""
         delay = self.parameter(f"{term.label}.{term.element.dead_time}")
         m, self.pasts = self.pasts, self.pasts + 1
         self.lines += [
@@ -116,7 +118,7 @@ class Writer:
 
 
 def _joint(writer: Writer, number: int, joint: str, model: Model) -> None:
-    """Lines for one joint: from its command to the force and the damping that the body is given."""
+    """Lines for one joint: from its command to the force and the damping on the body."""
     writer.joint = joint
     kernels = [term for term in model.terms if term.element.kernel is not None]
     lines = writer.lines
@@ -150,7 +152,7 @@ def _joint(writer: Writer, number: int, joint: str, model: Model) -> None:
 
 
 def _forces(writer: Writer, number: int, force: list[Term]) -> None:
-    """Forces along the joint, those without a memory of their own by their secant."""
+    """Forces along the joint; those without states are coupled by their secant."""
     lines = writer.lines
     whole = any(term.element.acts in ("modifier", "transmission") for term in force)
     plain = [one for one in force if one.element.acts in ("leg", "body")]
@@ -183,7 +185,7 @@ def _forces(writer: Writer, number: int, force: list[Term]) -> None:
 
 
 def written(paths: Mapping[str, Model], live: bool = False) -> tuple[Writer, dict[str, Module]]:
-    """The lines for all paths, and by name the kernels that they call. Raises InputError for a base's motion as an input."""
+    """The lines for all paths, and by name the kernels that they call. Raises InputError for base motion as an input."""
     writer = Writer(live=live)
     for number, (joint, model) in enumerate(paths.items()):
         if room := [term for term in model.terms if term.against == "room"]:

@@ -1,8 +1,8 @@
 """A robot's MJCF or URDF file as a specification that MuJoCo compiles.
 
-URDF files of real robots seldom compile as they are. Their meshes are named by ROS package (`package://`) or have formats that MuJoCo does not
-read, links that only carry a frame have no mass, and some inertias, rounded or guessed, are those of no rigid body. Masses and
-inertias are what a body needs; its shapes matter only where something touches.
+URDF files of real robots seldom compile unchanged. Their meshes are named by ROS package (`package://`) or have
+formats that MuJoCo does not read. Links that only carry a frame have no mass. Some inertias, rounded or guessed,
+are physically impossible. A body needs masses and inertias; its shapes matter only for contacts.
 """
 
 import os
@@ -24,11 +24,13 @@ MISSING = "machines of several joints need MuJoCo: pip install 'rhythmid[legs]'"
 FIXED, FREE = "fixed", "free"
 MESHES = (".stl", ".obj", ".msh")  # formats that MuJoCo reads (its documentation, "mesh")
 PACKAGE, FILE = "package://", "file://"
-# [kg, kg m^2] of a moving link that has no mass of its own, so that MuJoCo can divide by it
+# [kg, kg m^2] for a moving link without mass, so that MuJoCo can divide by it
 LEAST_MASS, LEAST_INERTIA = 1e-12, 1e-14
-ROUNDING = 1e-9  # of a moment by which it stays within what is possible, so that MuJoCo's own rounding does not refuse it
-SEVERAL = frozenset({"visual", "collision"})  # of which a link of a URDF has as many as it likes
-ROUNDED = 1e-3  # share by which an inertia may be impossible through rounding in the file, about which nothing is said
+# relative margin of a moment to the physical limit, so that MuJoCo's rounding does not reject it
+ROUNDING = 1e-9
+SEVERAL = frozenset({"visual", "collision"})  # elements that may occur several times in a link of a URDF
+# largest relative violation of the physical limits that counts as rounding in the file and is not reported
+ROUNDED = 1e-3
 
 
 def mujoco() -> Any:
@@ -42,12 +44,12 @@ def mujoco() -> Any:
 
 @dataclass(frozen=True)
 class RobotFile:
-    """What is in a robot's file.
+    """Content of a robot's file.
 
     Attributes
     ----------
     spec : a `mujoco.MjSpec`, to be compiled.
-    notes : in words, what had to be left out or changed.
+    notes : parts that were left out or changed, in words.
     """
 
     spec: Any
@@ -57,10 +59,11 @@ class RobotFile:
 def read_robot(
     path: Path, base: str = FIXED, contacts: bool = True, hold: Mapping[str, float] | None = None
 ) -> RobotFile:
-    """The specification in a file, without the free joint of a base that is fixed, and with the joints in `hold` fixed at these positions.
+    """The specification in a file, without the free joint of a fixed base, and with the joints in `hold` fixed at
+    these positions.
 
-    Of a URDF meshes are left out where there are no contacts. Raises InputError where contacts need one that cannot be read, and where
-    MuJoCo refuses the file.
+    Meshes of a URDF are left out where there are no contacts. Raises InputError where contacts need a mesh that
+    cannot be read, and where MuJoCo rejects the file.
     """
     mj = mujoco()
     if not path.is_file():
@@ -79,7 +82,7 @@ def read_robot(
                 raise _without_links(path) or refused(path, further) from None
     if base == FIXED:
         floating = [one for one in spec.joints if one.type == mj.mjtJoint.mjJNT_FREE]
-        for one in (*floating, *(spec.keys if floating else ())):  # key frames hold its positions, too
+        for one in (*floating, *(spec.keys if floating else ())):  # key frames contain its positions, too
             spec.delete(one)
     if path.suffix.lower() != ".urdf":
         _hold(spec, hold or {}, path)
@@ -97,7 +100,8 @@ def read_robot(
 
 @contextmanager
 def warnings_told() -> Iterator[list[str]]:
-    """MuJoCo's warnings, a line each, which it would otherwise print and write to a file in the current folder."""
+    """Collects MuJoCo's warnings, one line each, which it would otherwise print and write to a file in the current
+    folder."""
     mj, told = mujoco(), list[str]()
     before = mj.get_mju_user_warning()
     mj.set_mju_user_warning(lambda line: told.append(" ".join(line.split())))
@@ -110,10 +114,10 @@ def warnings_told() -> Iterator[list[str]]:
 
 
 def quiet_data(model: Any) -> Any:
-    """An `MjData` in which MuJoCo says nothing of what goes wrong in a run; those who run it look for numbers that are not finite.
+    """An `MjData` for which MuJoCo prints no warnings about a run; the caller checks for values that are not finite.
 
-    MuJoCo prints a warning, and writes it to a file in the current folder, only where the count of its kind in the data is 0 (its
-    documentation, mjWarningStat; engine_core_util.c, mj_warning).
+    MuJoCo prints a warning, and writes it to a file in the current folder, only where the count of its kind in the
+    data is 0 (its documentation, mjWarningStat; engine_core_util.c, mj_warning).
     """
     data = mujoco().MjData(model)
     for kind in data.warning:
@@ -122,14 +126,15 @@ def quiet_data(model: Any) -> Any:
 
 
 def refused(path: Path, error: Exception) -> InputError:
-    """What MuJoCo says of a file, in one line."""
+    """MuJoCo's message about a file, in one line."""
     return InputError(f"{path}: MuJoCo refuses it: {' '.join(str(error).split())}")
 
 
 def without_repetitions(path: Path) -> tuple[str, list[str]]:
-    """The text of a URDF without elements that stand again where one is expected, and a note on each; no notes where there are none.
+    """The text of a URDF without repeated elements where one is expected, and a note on each; no notes where there
+    are none.
 
-    The first one is kept, as ROS's parser does (urdfdom, `FirstChildElement`).
+    The first one is kept, as in ROS's parser (urdfdom, `FirstChildElement`).
     """
     try:
         robot = tree.parse(path).getroot()
@@ -151,7 +156,7 @@ def without_repetitions(path: Path) -> tuple[str, list[str]]:
 
 
 def _without_links(path: Path) -> InputError | None:
-    """What to do about links that joints of a URDF name and that it does not have, in one line; None where there are none."""
+    """Advice about links that joints of a URDF name but that do not exist, in one line; None where there are none."""
     try:
         robot = tree.parse(path).getroot()
     except tree.ParseError:
@@ -177,7 +182,7 @@ def _leave_meshes_out(spec: Any) -> None:
 
 
 def _find_meshes(spec: Any, path: Path) -> None:
-    """Give every mesh the place of its file. Raises InputError where there is none that MuJoCo reads."""
+    """Set the file of every mesh. Raises InputError where there is none in a format that MuJoCo reads."""
     folder = path.resolve().parent
     unreadable = []
     for mesh in spec.meshes:
@@ -195,9 +200,10 @@ def _find_meshes(spec: Any, path: Path) -> None:
 
 
 def mesh_file(name: str, folder: Path) -> Path | None:
-    """The file that a mesh is named by, in a URDF in `folder`; None where there is none.
+    """The file of a mesh name in a URDF in `folder`; None where there is none.
 
-    A package is a folder of that name above the file, or in one of ROS_PACKAGE_PATH, or in share/ of one of AMENT_PREFIX_PATH.
+    A package is a folder of that name above the file, in a folder of ROS_PACKAGE_PATH, or in share/ of a folder of
+    AMENT_PREFIX_PATH.
     """
     if name.startswith(PACKAGE):
         package = name.removeprefix(PACKAGE)
@@ -218,9 +224,9 @@ def _listed(variable: str) -> list[Path]:
 
 
 def _hold(spec: Any, hold: Mapping[str, float], path: Path) -> None:
-    """Take joints out, the links that they move turned or shifted to where the joints are at these positions.
+    """Remove joints, with the links that they move rotated or shifted to these positions.
 
-    Raises InputError where the file has no such hinge or slide.
+    Raises InputError where the file has no such hinge or slide joint.
     """
     mj = mujoco()
     kinds = mj.mjtJoint.mjJNT_HINGE, mj.mjtJoint.mjJNT_SLIDE
@@ -236,7 +242,7 @@ def _hold(spec: Any, hold: Mapping[str, float], path: Path) -> None:
 
 
 def _turn(joint: Any, drawn: Any, position: float) -> None:
-    """Put the link that a joint moves where it is at this position; `drawn` is the compiled file, whose frames all are in one form."""
+    """Move the link of a joint to this position; `drawn` is the compiled file, in which all frames have one form."""
     link, known = joint.parent, drawn.joint(joint.name)
     number = int(known.bodyid[0])
     frame = Rotation.from_quat(np.roll(drawn.body_quat[number], -1))
@@ -260,7 +266,7 @@ def _compiled(spec: Any, path: Path) -> Any:
 
 
 def _held_fast(spec: Any) -> Iterator[str]:
-    """Take out the joints that move no mass, such as those of a gripper that is described by its shapes only."""
+    """Remove the joints that move no mass, such as those of a gripper that is described only by its shapes."""
     idle = [joint for joint in spec.joints if _mass_beyond(joint.parent) == 0.0]
     if idle:
         yield f"held fast, because what they move has no mass: {', '.join(joint.name for joint in idle)}"
@@ -268,7 +274,7 @@ def _held_fast(spec: Any) -> Iterator[str]:
 
 
 def _coupled(spec: Any) -> Iterator[str]:
-    """Joints that the file couples, such as the fingers of a gripper (`mimic` in a URDF)."""
+    """Joints that are coupled in the file, such as the fingers of a gripper (`mimic` in a URDF)."""
     for one in spec.equalities:
         if one.type == mujoco().mjtEq.mjEQ_JOINT and one.name2:
             yield (
@@ -278,7 +284,8 @@ def _coupled(spec: Any) -> Iterator[str]:
 
 
 def _take_out(spec: Any, joints: Sequence[Any]) -> None:
-    """Take joints out, and what refers to them: couplings, actuators, sensors, key frames, whose positions have other places then."""
+    """Remove joints and everything that refers to them: couplings, actuators, sensors, and key frames, whose
+    positions would have other indices."""
     names = {joint.name for joint in joints}
     spoken = [one for one in spec.equalities if names & {one.name1, one.name2}]
     spoken += [one for one in spec.actuators if one.target in names]
@@ -288,12 +295,12 @@ def _take_out(spec: Any, joints: Sequence[Any]) -> None:
 
 
 def _mass_beyond(link: Any) -> float:
-    """Mass [kg] of a link and of all that hang on it."""
+    """Mass [kg] of a link and of all links that it carries."""
     return float(sum(one.mass for one in (link, *link.find_all("body"))))
 
 
 def _with_possible_inertias(spec: Any) -> Iterator[str]:
-    """Replace inertias that no rigid body has by the nearest possible ones."""
+    """Replace physically impossible inertias by the nearest possible ones."""
     for link in spec.bodies:
         if not link.explicitinertial or not np.all(np.isfinite(link.fullinertia)):
             continue
@@ -313,15 +320,15 @@ def _with_possible_inertias(spec: Any) -> Iterator[str]:
 
 
 def _matrix(six: Any) -> NDArray[np.float64]:
-    """The inertia (3, 3) of xx, yy, zz, xy, xz, yz."""
+    """The inertia (3, 3) with the entries xx, yy, zz, xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = (float(one) for one in six)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def possible_moments(moments: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The principal moments of inertia (3,) of a rigid body nearest to these, in ascending order.
+    """The physically possible principal moments of inertia (3,) nearest to these, in ascending order.
 
-    None is negative, and none is greater than the sum of the other two (L. D. Landau, E. M. Lifshitz, Mechanics, section 32).
+    None is negative, and none exceeds the sum of the other two (L. D. Landau, E. M. Lifshitz, Mechanics, section 32).
     """
     low, middle, high = np.maximum(moments, LEAST_INERTIA)
     beyond = high - low - middle

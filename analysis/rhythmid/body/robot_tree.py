@@ -1,10 +1,10 @@
-"""Which joint of a body carries which."""
+"""Kinematic tree of a body's joints."""
 
 from rhythmid.body.mujoco_body import MujocoBody
 
 
 def parents_of(body: MujocoBody) -> dict[str, str | None]:
-    """Of each joint the one that carries it; none of one at the base."""
+    """For each joint the joint that carries it; None for one at the base."""
     model, found = body.model, {}
     last: dict[int, str] = {}  # the last joint of each link
     for number in range(model.njnt):

@@ -1,21 +1,22 @@
-"""What is measured between the steps of a run: positions on the cubic through positions and speeds, all else on straight lines; an effort
-also as its mean, as drives report it.
+"""Samples between the steps of a run: cubic interpolation of positions by positions and speeds, linear
+interpolation of all else, and the mean effort that drives report.
 
-A held reference jumps at the stamp of a sample, and the effort with it. An effort taken at that instant is ahead of what acts between the
-samples by half a period, in the reference alone: an analysis would read it as damping and inertia that the joint has not (a controller's gain
-times half a period). The mean over the period before a stamp is late by half a period in all its parts alike, like any measurement.
+A held reference jumps at the stamp of a sample, and the effort with it. An effort sampled at that instant leads the
+mean effort between samples by half a period, but only in the part due to the reference. An analysis would interpret
+this as additional damping and inertia of the joint (a controller's gain times half a period). The mean over the
+period before a stamp is delayed by half a period in all its parts, like any measurement.
 """
 
 import math
 
 from numba import njit
 
-ON_STEP = 1e-6  # of a step: a time that near to a step's begin is meant to be there
+ON_STEP = 1e-6  # in steps: a time that close to a step's start is taken as that start
 
 
 @njit("UniTuple(float64, 2)(float64, float64, float64)", cache=True, error_model="numpy")
 def place_of(time, begin, step):
-    """Number of the step in which a time lies, and the share of it that has gone."""
+    """Number of the step that contains a time, and the elapsed share of that step."""
     steps = (time - begin) / step
     nearest = math.floor(steps + 0.5)
     if abs(steps - nearest) < ON_STEP:
@@ -29,9 +30,9 @@ def place_of(time, begin, step):
     error_model="numpy",
 )
 def sample_joints(rows, first, begin, step, times, out):
-    """Position, velocity, sensor's output and effort, `out` (4, n, joints), at times (n, joints) [s].
+    """Position, velocity, sensor output and effort, `out` (4, n, joints), at times (n, joints) [s].
 
-    `rows` are what the stepping tells at its steps from the number `first` on: for each joint these four.
+    `rows` hold these four quantities of each joint for the steps from the number `first` on.
     """
     for i in range(times.shape[0]):
         for j in range(times.shape[1]):
@@ -71,9 +72,11 @@ def sample_columns(rows, from_column, first, begin, step, times, out):
     error_model="numpy",
 )
 def mean_efforts(rows, first, begin, step, span, times, out):
-    """Mean effort, `out` (n, joints), over the `span` [s] before times (n, joints) [s]; before the run it is what it is at its begin.
+    """Mean effort, `out` (n, joints), over the `span` [s] before times (n, joints) [s]; before the run its initial
+    value is used.
 
-    A step holds its effort, and the order of the sum does not depend on where `rows` begin: all chunks give the same bits.
+    A step holds its effort. The order of the sum does not depend on where `rows` begin, so the result is bitwise
+    equal for any chunks.
     """
     for i in range(times.shape[0]):
         for j in range(times.shape[1]):

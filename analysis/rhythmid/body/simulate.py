@@ -1,4 +1,4 @@
-"""Runs of a machine of several joints."""
+"""Simulation of a machine of several joints."""
 
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -24,16 +24,16 @@ from rhythmid.simulation.signal import FAR
 from rhythmid.simulation.simulate import delayed_command, physical_times, samplers
 
 Start = Mapping[str, float]
-AT_ONCE = 2e7  # numbers that a run may keep
+AT_ONCE = 2e7  # largest number of values in memory
 
 
 @dataclass(frozen=True)
 class JointTrajectory:
-    """A run of a machine; of each joint in `joints` a column of the arrays (n, joints).
+    """A run of a machine; the arrays (n, joints) have a column for each joint in `joints`.
 
-    `time` [s] are the stamps that were asked for. `output` is what the sensors say, `position`, `velocity` and `effort`, the
-    actuators' force, are true at the same stamps less the measurement's delay. `pose` (n, nq) and `rate` (n, nv) are of the
-    whole body at the stamps themselves.
+    `time` [s] are the requested stamps. `output` holds the sensors' values. `position`, `velocity` and the
+    actuators' forces `effort` are the true ones at these stamps minus the measurement delay. `pose` (n, nq) and
+    `rate` (n, nv) are of the whole body at the stamps themselves.
     """
 
     time: Array
@@ -48,7 +48,7 @@ class JointTrajectory:
 
 @dataclass(frozen=True)
 class Stepping:
-    """The compiled loop of a structure of paths, for all values of their parameters."""
+    """The compiled loop of a structure of paths, for any parameter values."""
 
     layout: Layout
     run: Callable[..., int]
@@ -56,7 +56,7 @@ class Stepping:
 
 @dataclass(frozen=True, eq=False)
 class _Paths:
-    """Paths that take no part in the cache's key: machines that differ in values share one compiled loop."""
+    """Paths that are not part of the cache's key: machines that differ in values share one compiled loop."""
 
     paths: dict[str, Model]
 
@@ -74,7 +74,7 @@ def _stepping(key: Hashable, paths: _Paths) -> Stepping:
 
 
 def compile_machine(machine: Machine) -> Stepping:
-    """The compiled loop of a machine; parameter values play no part."""
+    """The compiled loop of a machine, independent of parameter values."""
     key = tuple(
         (
             joint,
@@ -90,7 +90,7 @@ def compile_machine(machine: Machine) -> Stepping:
 
 
 def pose_of(machine: Machine, start: Start) -> Array:
-    """Position vector (nq,) with the named joints at these positions, the others at the reference pose."""
+    """Position vector (nq,) with the named joints at these positions and the others at the reference pose."""
     pose = machine.body.reference.copy()
     for name, value in start.items():
         pose[machine.body.joint(name).position] = value
@@ -98,7 +98,7 @@ def pose_of(machine: Machine, start: Start) -> Array:
 
 
 def means(signal: PPoly | None, begin: float, step: float, count: int) -> Array:
-    """Mean (count,) of a signal over each step, which keeps its impulse; before its first knot it is 0."""
+    """Mean (count,) of a signal over each step, which preserves its impulse; before its first knot it is 0."""
     if signal is None:
         return np.zeros(count)
     edges = begin + step * np.arange(count + 1)
@@ -126,13 +126,13 @@ def simulate(
     Parameters
     ----------
     times : (n,) stamps [s] of the measurements, increasing.
-    command : by joint what its command path is given: a force, or where a controller is in the path its reference.
-    forcing : by joint a force that is added behind the controller (feed-forward).
-    start : positions of joints at the first step, or whole vectors (nq,), (nv,); else the reference pose, at rest.
+    command : by joint the input of its command path: a force, or the reference of a controller in the path.
+    forcing : by joint a force that is added after the controller (feed-forward).
+    start : positions of joints at the first step, or whole vectors (nq,), (nv,); by default the reference pose at rest.
     seed : of the noise; without one the output is deterministic.
-    worker : model and data to run on, from `MujocoBody.worker`; their parameters are the machine's.
+    worker : model and data for the run, from `MujocoBody.worker`, with the machine's parameters.
 
-    Raises InputError where the run diverges, the times do not increase, or a joint is not known.
+    Raises InputError where the run diverges, the times do not increase, or a joint is unknown.
     """
     times = np.ascontiguousarray(times, dtype=float)
     if len(times) < 1 or np.any(np.diff(times) < 0.0) or not np.isfinite(times).all():
@@ -150,7 +150,8 @@ def simulate(
 
 
 def begin_of(first: float, earliest: float, step: float) -> float:
-    """Where a run begins [s]: whole steps before its first stamp, when the oldest of the first measurements is taken or before."""
+    """Start time [s] of a run: a whole number of steps before its first stamp, not after the oldest of the first
+    measurements."""
     return first - step * max(math.ceil((first - earliest) / step - 1e-6), 0)
 
 
@@ -164,10 +165,11 @@ def sampled(
     noise: Sequence[list],
     span: float = 0.0,
 ) -> JointTrajectory:
-    """What is measured at stamps `times` (n,) of a run that begins at `begin` [s].
+    """Measurements at stamps `times` (n,) of a run that begins at `begin` [s].
 
-    `physical` (n, joints) tells when the measurements were taken, `rows` are of the steps from the number `first` on, and `noise` has for
-    each joint what happens to samples. The effort is the mean over a `span` [s] before, or without one that of the instant.
+    `physical` (n, joints) are the times [s] at which measurements were taken, `rows` those of the steps from the
+    number `first` on. `noise` has for each joint the operations on its samples. The effort is the mean over the
+    `span` [s] before, or instantaneous for 0.
     """
     names, nq = machine.joints, machine.body.model.nq
     made = np.empty((len(COLUMNS), len(times), len(names)))
@@ -198,7 +200,7 @@ def run_steps(
     start: Start | tuple[Array, Array] | None = None,
     worker: tuple[Any, Any] | None = None,
 ) -> tuple[Array, Array]:
-    """Times (count,) of the steps and rows of what `Stepping.run` fills. Arguments as for `simulate`."""
+    """Times (count,) of the steps and the rows filled by `Stepping.run`. Arguments as for `simulate`."""
     stepping = compile_machine(machine)
     step = machine.body.step
     names = machine.joints
@@ -253,7 +255,7 @@ def start_states(
     command: NDArray,
     forcing: NDArray,
 ) -> Array:
-    """The elements' own states at the start, as they would be there after a while."""
+    """The elements' own states at the start: those after a long time in the initial condition."""
     found: dict[tuple[str, str], float] = {}
     for place, (joint, model) in enumerate(paths.items()):
         own = joints[joint]
@@ -274,7 +276,7 @@ def start_states(
 
 
 def _effort(model: Model, position: float, velocity: float, command: float) -> float:
-    """What a controller in the path asks for at this command; the command where there is none."""
+    """Output of a controller in the path for this command; the command itself where there is none."""
     for term in model.terms:
         if term.element.acts == "feedback" and not term.element.own and term.element.kernel is not None:
             values = term.numbers

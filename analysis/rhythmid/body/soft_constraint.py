@@ -1,8 +1,8 @@
-"""Friction that is a constraint, in MuJoCo's words: `frictionloss` with the solver's parameters that make it the identified law.
+"""Dry friction as a MuJoCo constraint: `frictionloss`, with solver parameters that represent the identified law.
 
-MuJoCo asks a joint with dry friction for the acceleration −b v and lets the force −(a + b v) / R grow no further than the friction loss.
-b = 2 / (d timeconst), R = (1 − d) w / d: w is the joint's `dof_invweight0`, and d is here the same for all violations. F = −clip(m (a + v / τ) / s,
-±F_c) follows with 1 / b = τ and R = s / m.
+For a joint with dry friction, MuJoCo's constraint requests the acceleration −b v and limits the force −(a + b v) /
+R to the friction loss. b = 2 / (d timeconst), R = (1 − d) w / d, where w is the joint's `dof_invweight0` and d is
+here the same for all violations. F = −clip(m (a + v / τ) / s, ±F_c) follows with 1 / b = τ and R = s / m.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from rhythmid.model import Model, Term
 
 NAME = "soft_constraint_friction"
 LEAST_IMPEDANCE, MOST_IMPEDANCE = 1e-4, 0.9999  # mjMINIMP, mjMAXIMP: MuJoCo clips d to these
-CRITICAL = 1.0  # damping ratio, which no friction uses: a friction has no position to return to
+CRITICAL = 1.0  # damping ratio; irrelevant for friction, which has no position to return to
 
 
 @dataclass(frozen=True)
@@ -28,20 +28,21 @@ class SoftConstraint:
 
     @classmethod
     def of(cls, term: Term, mass: float) -> "SoftConstraint":
-        """The friction of a term, of a path with this inertia."""
+        """The friction of a term in a path with inertia `mass`."""
         values = term.numbers
         return cls(values["force"], values["softness"] / mass, values["lead"])
 
     def solver(self, weight: float, step: float) -> tuple[tuple[float, float], tuple[float, float]]:
-        """MuJoCo's `solref` and the first two numbers of its `solimp`, for a joint of this `dof_invweight0` and steps [s] as long as
-        these, which no lead is shorter than."""
+        """MuJoCo's `solref` and the first two numbers of its `solimp`, for a joint with this `dof_invweight0`. The
+        lead is at least one step [s]."""
         lead = max(self.lead, step)
         impedance = min(max(weight / (weight + self.regularisation), LEAST_IMPEDANCE), MOST_IMPEDANCE)
         return (2.0 * lead / impedance, CRITICAL), (impedance, impedance)
 
 
 def put(model: Any, joints: Mapping[str, Joint], paths: Mapping[str, Model]) -> None:
-    """Give MuJoCo's model the dry friction that paths have as constraints. Raises InputError for another constraint, which it lacks."""
+    """Set the dry friction of paths with constraints in MuJoCo's model. Raises InputError for another constraint,
+    which MuJoCo lacks."""
     for name, path in paths.items():
         for term in (one for one in path.terms if one.element.acts == "constraint"):
             if term.element.name != NAME:

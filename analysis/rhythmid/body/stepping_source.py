@@ -1,20 +1,21 @@
-"""The loop of a machine of several joints as source text: the joints' paths around MuJoCo's step.
+"""Source text of the loop of a machine of several joints: the joints' paths around MuJoCo's step.
 
-A run may go on where another ended: `first` is the number of its first step, and `states` and `past` are left as they are at the
-end. With `peek` the last row tells what is at its time, and the step from there is left to the next run.
+A run may continue an earlier one: `first` is the number of its first step, and `states` and `past` hold the values
+at the end of the earlier run. With `peek` the last row describes the state at its time, and the step from there is
+left to the next run.
 """
 
 from rhythmid.body.path_source import COLUMNS, Layout, written
 from rhythmid.model import Model
 from rhythmid.simulation.machine_code import Module
 
-# [rad/s or m/s] beyond which a run has diverged: no joint turns at 100 000 revolutions a minute
+# [rad/s or m/s] speed above which a run has diverged: no joint turns at 100 000 revolutions a minute
 FASTEST = 1e4
-STRONGEST = 1e7  # [N or N*m] along a joint, the same: MuJoCo is not asked to go on
+STRONGEST = 1e7  # [N or N*m] the same for the force along a joint: MuJoCo does not continue
 
 
 def generate(paths: dict[str, Model]) -> tuple[Module, Layout]:
-    """The module for these paths, and the layout of its arrays. Raises InputError for a base's motion as an input."""
+    """The module for these paths, and the layout of its arrays. Raises InputError for base motion as an input."""
     writer, kernels = written(paths)
     base = len(paths) * len(COLUMNS)
     text = "\n".join(

@@ -1,8 +1,9 @@
-"""A machine back into the body's own format: MJCF or URDF with the identified values in place.
+"""Writes a machine in the body's own format: MJCF or URDF with the identified values.
 
-MJCF has masses, rotors' inertias, viscous damping, dry friction (a soft constraint there; here a smooth law, or that constraint), and an
-actuator for each path with the controller's gains, a lag and a delay; URDF has masses, inertias and the two losses. What a file cannot express is
-told by name. The MJCF holds the paths themselves, too: `rhythmid.mujoco.apply` makes them act in a loop of the user's own.
+MJCF has masses, rotors' inertias, viscous damping and dry friction (a soft constraint there; here a smooth law, or
+that constraint). It has an actuator for each path with the controller's gains, a lag and a delay. URDF has masses,
+inertias and the two losses. Effects that a file cannot express are reported by name. The MJCF also contains the
+paths themselves: `rhythmid.mujoco.apply` makes them act in a user's own simulation loop.
 """
 
 import os
@@ -30,8 +31,9 @@ from rhythmid.output import write_text
 
 Array = NDArray[np.float64]
 MJCF, URDF = ".xml", ".urdf"
-ROUNDING = 1e-12  # of a link's inertia, that comes of its numbers
-LEAST_GYRATION_RADIUS = 1e-3  # [m] radius of gyration of a payload in a URDF, which has no inertia of zero
+ROUNDING = 1e-12  # relative rounding error of a link's inertia
+# [m] radius of gyration of a payload in a URDF, in which an inertia cannot be zero
+LEAST_GYRATION_RADIUS = 1e-3
 LOSSES = ("viscous_damper", "coulomb_friction", "soft_constraint_friction")
 KEPT = (
     "name",
@@ -39,9 +41,9 @@ KEPT = (
     "group",
     "forcerange",
     "forcelimited",
-)  # of an actuator; its class's other words are overridden
+)  # of an actuator; further attributes of its class are overridden
 PLAIN = {"ctrllimited": "false", "dyntype": "none", "gaintype": "fixed", "biastype": "none", "gear": "1"}
-WRITTEN = {"ipos": "pos", "iquat": "quat", "inertia": "diaginertia"}  # of an inertial
+WRITTEN = {"ipos": "pos", "iquat": "quat", "inertia": "diaginertia"}  # of an inertial element
 IN_PLACE = frozenset(
     (
         "inertia", "damping", "friction", "position_gain", "velocity_gain", "command_delay", "command_lag", "gain", "actuator_lag",
@@ -51,9 +53,10 @@ IN_PLACE = frozenset(
 
 
 def save_machine(machine: Machine, path: Path) -> tuple[str, ...]:
-    """Write a machine as its suffix says: .yaml, .xml (MJCF) or .urdf. Returns in words what the file cannot express.
+    """Write a machine in the format of its suffix: .yaml, .xml (MJCF) or .urdf. Returns in words what the file
+    cannot express.
 
-    Raises InputError where a body that is no URDF is to become one, or the place is not writable.
+    Raises InputError where a body from another format is to be written as URDF, or the location is not writable.
     """
     if path.suffix == MJCF:
         write_text(path, mjcf_of(machine, path.parent))
@@ -76,13 +79,13 @@ def _beyond_losses(machine: Machine) -> list[str]:
 
 
 def unexpressed(machine: Machine, joint: str) -> tuple[str, ...]:
-    """What MJCF cannot express of a joint's path, or only nearly."""
+    """Effects in a joint's path that MJCF cannot express, or only approximately."""
     described = _described(machine, joint)
     return described.inexpressible(IN_PLACE & mjcf.expressed(described))
 
 
 def _described(machine: Machine, joint: str) -> Joint:
-    return joint_of(machine.paths[joint], "joint")  # the name is the file's, whatever letters it has
+    return joint_of(machine.paths[joint], "joint")  # the name is the file's, with any characters
 
 
 def losses_of(machine: Machine, joint: str) -> tuple[float, float]:
@@ -92,7 +95,7 @@ def losses_of(machine: Machine, joint: str) -> tuple[float, float]:
 
 
 def mjcf_of(machine: Machine, folder: Path) -> str:
-    """The body's file with the machine's values, as MJCF that stands in `folder`."""
+    """The body's file with the machine's values, as MJCF for the folder `folder`."""
     known = machine.body
     spec = read_robot(known.path, known.base, known.contacts, known.hold).spec
     model = machine.body.model
@@ -106,7 +109,7 @@ def mjcf_of(machine: Machine, folder: Path) -> str:
     spec.compile()
     root = tree.fromstring(spec.to_xml())
     folders = {"meshdir": [*spec.meshes, *spec.hfields], "texturedir": spec.textures}
-    for kind in (one for one, files in folders.items() if files):  # relative to the file that is written
+    for kind in (one for one, files in folders.items() if files):  # relative to the written file
         known = machine.body.path.resolve().parent / getattr(spec, kind)
         _section(root, "compiler").set(kind, os.path.relpath(known, folder.resolve()))
     _values(root, machine, step)
@@ -119,7 +122,7 @@ def mjcf_of(machine: Machine, folder: Path) -> str:
 
 
 def _values(root: tree.Element, machine: Machine, step: float) -> None:
-    """Inertials and joints with all digits of the machine's values; MuJoCo itself writes fewer."""
+    """Set inertials and joints with all digits of the machine's values; MuJoCo itself writes fewer."""
     model, body = machine.body.model, machine.body
     world = _section(root, "worldbody")
     for link in (one for one in world.iter("body") if one.get("name") in body.links):
@@ -133,7 +136,7 @@ def _values(root: tree.Element, machine: Machine, step: float) -> None:
         name = str(joint.get("name"))
         dof = body.joints[name].velocity
         joint.set("armature", repr(float(model.dof_armature[dof])))
-        # a spring that the file gives by its time constant would follow the identified inertia
+        # a spring given by its time constant would depend on the identified inertia
         spring = float(model.jnt_stiffness[model.joint(name).id])
         joint.set(
             "stiffness", mjcf.polynomial(spring, *_higher(model, "jnt_stiffnesspoly", model.joint(name).id))
@@ -147,7 +150,7 @@ def _values(root: tree.Element, machine: Machine, step: float) -> None:
 
 
 def _higher(model: Any, coefficients: str, place: int) -> list[float]:
-    """The coefficients beyond the linear one of a spring or a damper, which stay in the body; MuJoCo before 4.0 has none."""
+    """The nonlinear coefficients of a spring or a damper, which remain in the body; MuJoCo before 4.0 has none."""
     return [float(one) for one in getattr(model, coefficients, {place: ()})[place]]
 
 
@@ -157,7 +160,8 @@ def _section(root: tree.Element, name: str) -> tree.Element:
 
 
 def _actuators(root: tree.Element, machine: Machine, step: float) -> None:
-    """One actuator for each path: the joint's first one, or a new one. Further ones of the joint stay in `ctrl`, without effect."""
+    """One actuator for each path: the joint's first one, or a new one. Further actuators of the joint remain in
+    `ctrl`, without effect."""
     section = _section(root, "actuator")
     for joint in machine.joints:
         described = _described(machine, joint)
@@ -172,7 +176,7 @@ def _actuators(root: tree.Element, machine: Machine, step: float) -> None:
 
 
 def _become(actuator: tree.Element, attributes: dict[str, str]) -> None:
-    """A general actuator with these attributes, and of its own what every actuator has."""
+    """Convert to a general actuator with these attributes, keeping the attributes common to all actuators."""
     kept = {name: value for name, value in actuator.attrib.items() if name in KEPT}
     attributes = {name: value for name, value in attributes.items() if name != "name"}
     actuator.tag = "general"
@@ -181,7 +185,7 @@ def _become(actuator: tree.Element, attributes: dict[str, str]) -> None:
 
 
 def _embed(root: tree.Element, machine: Machine, step: float) -> None:
-    """The paths as a text of the file, with room for what lasts from step to step."""
+    """Add the paths as a text of the file, with space for the variables that persist between steps."""
     _, layout = generate_live(machine.paths)
     size = _section(root, "size")
     needed = numbers_of(layout, rows_of(machine.paths, step))
@@ -193,14 +197,14 @@ def _embed(root: tree.Element, machine: Machine, step: float) -> None:
 
 
 def _carrier(link: str, parents: Mapping[str, str], moving: Collection[str]) -> str:
-    """The moving link that a link of a URDF is part of: itself, or the nearest one to which fixed joints lead."""
+    """The moving link to which a link of a URDF belongs: itself, or the nearest one through fixed joints."""
     while link not in moving and link in parents:
         link = parents[link]
     return link
 
 
 def _fixed_to(root: tree.Element, held: Collection[str]) -> dict[str, str]:
-    """The link to which each link of a URDF that does not move against it is fixed."""
+    """The link to which each link of a URDF is fixed, for those that do not move relative to it."""
     ends = [
         [one.get("link", "") for end in ("child", "parent") for one in joint.findall(end)]
         for joint in root.iter("joint")
@@ -219,7 +223,8 @@ def _scale(link: tree.Element, share: float) -> None:
 
 
 def _add_inertia(link: tree.Element, ten: Array) -> None:
-    """Add the moments of inertia among ten numbers (10,) to a link of a URDF, which has the inertia of what is fixed to it as well."""
+    """Add the moments of inertia in ten parameters (10,) to a link of a URDF, which includes the inertia of
+    everything fixed to it."""
     inertial = _section(link, "inertial")
     inertia, origin = _section(inertial, "inertia"), inertial.find("origin")
     _section(inertial, "mass").attrib.setdefault("value", "0")
@@ -233,7 +238,7 @@ def _add_inertia(link: tree.Element, ten: Array) -> None:
 
 
 def _attach(root: tree.Element, link: str, mass: float, place: Sequence[float]) -> None:
-    """Fix a ball of this mass to a link of a URDF, at a place of its frame."""
+    """Fix a ball of this mass to a link of a URDF, at a position in its frame."""
     own = f"{link}_{PAYLOAD}"
     ball = tree.SubElement(tree.SubElement(root, "link", name=own), "inertial")
     tree.SubElement(ball, "mass", value=repr(mass))
@@ -247,13 +252,14 @@ def _attach(root: tree.Element, link: str, mass: float, place: Sequence[float]) 
 
 
 def _beyond_mass(body: MujocoBody, given: MujocoBody, link: str) -> Array:
-    """By how much the ten numbers (10,) of a link are others than those of the file for another mass of the same shape."""
+    """Difference of the ten parameters (10,) of a link from those of the file for another mass of the same shape."""
     now, before = body.own(link), given.own(link)
     return now.ten - before.ten * (now.mass / before.mass)
 
 
 def urdf_of(machine: Machine, folder: Path) -> str:
-    """The body's URDF with the machine's values, as one that stands in `folder`. Raises InputError where the body's file is no URDF."""
+    """The body's URDF with the machine's values, for the folder `folder`. Raises InputError where the body's file
+    is no URDF."""
     if machine.kind != "urdf":
         raise InputError(
             f"{machine.body.path}: is no URDF, so none can be written from it; write .xml (MJCF)"
@@ -274,7 +280,7 @@ def urdf_of(machine: Machine, folder: Path) -> str:
     for link, place in body.ends.items():
         if payload := known[f"{link}.{PAYLOAD}"]:
             _attach(document.getroot(), link, payload, place.tolist())
-    for mesh in document.iter("mesh"):  # relative to the file that is written
+    for mesh in document.iter("mesh"):  # relative to the written file
         file = mesh.get("filename", "")
         if file and "://" not in file:
             known_at = machine.body.path.resolve().parent / file

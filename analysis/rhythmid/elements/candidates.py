@@ -1,4 +1,5 @@
-"""Which elements could be missing from a model, with first guesses; and which are not tried, and why."""
+"""Elements that could be missing from a model, with first guesses; and the elements that are not tried, with the
+reasons."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,11 +12,11 @@ IDLE = "no command, forcing or controller drives the machine"
 
 @dataclass(frozen=True)
 class Setting:
-    """What of a model decides which effects it could lack.
+    """Properties of a model that decide which effects it could lack.
 
-    `present` holds what each of its terms is, as (element, against what it acts); `parameters` and `free` the names of all and
-    of the estimated parameters; `rotational` says whether positions are angles, `controlled` whether a controller closes
-    the loop.
+    `present` holds its terms as (element, what it acts against); `parameters` and `free` are the names of all and
+    of the estimated parameters; `rotational` says whether positions are angles, `controlled` whether a controller
+    closes the loop.
     """
 
     present: frozenset[tuple[str, str | None]]
@@ -27,17 +28,18 @@ class Setting:
 
 @dataclass(frozen=True)
 class Candidates:
-    """`tried` are first guesses of elements; `not_tried` says why a candidate of the catalogue has none, by its name."""
+    """`tried` are first guesses of elements; `not_tried` gives, by name, the reason why a candidate of the
+    catalogue has none."""
 
     tried: tuple[tuple[Element, dict[str, float]], ...]
     not_tried: Mapping[str, str]
 
 
 def candidates(catalogue: Mapping[str, Element], setting: Setting, scales: Scales) -> Candidates:
-    """First guesses of all elements that a model of this setting could lack, in records of these scales.
+    """First guesses of all elements that a model with this setting could lack, for records with these scales.
 
-    Where the input displaces the base, friction and dampers are tried against the base and against the room; the second come as
-    elements that act against the room (`Element.against`), with the same name.
+    Where the input displaces the base, friction and dampers are tried both against the base and against the room.
+    The latter are elements of the same name with `Element.against` set to the room.
     """
     tried: list[tuple[Element, dict[str, float]]] = []
     not_tried: dict[str, str] = {}
@@ -61,14 +63,15 @@ def candidates(catalogue: Mapping[str, Element], setting: Setting, scales: Scale
 
 
 def variants(element: Element, scales: Scales) -> tuple[Element, ...]:
-    """The element as it may act: where the base moves, a friction or a damper against the base or against the room."""
+    """The element in its possible forms: on a moving base, a friction or a damper against the base or against the
+    room."""
     if element.against is None or not scales.displaced_base:
         return (element,)
     return element.acting_against("base"), element.acting_against("room")
 
 
 def _unsuitable(element: Element, setting: Setting, scales: Scales) -> str | None:
-    """Why an element cannot be what the model lacks; None where it can."""
+    """Reason why an element cannot be the missing effect; None where it can."""
     names = {name for name, _ in setting.present}
     there = (element.name, element.against) in setting.present
     if not element.repeats and (there or (element.name in names and not scales.displaced_base)):

@@ -1,6 +1,6 @@
-"""The catalogue: every element found in the slot folders, in the user's own folders and in installed packages.
+"""The catalogue: all elements in the slot folders, in the user's own folders and in installed packages.
 
-A file becomes part of the catalogue by lying there: one `ELEMENT` a file. No list is kept.
+A file in one of these folders is part of the catalogue, with one `ELEMENT` per file. There is no list to maintain.
 """
 
 import importlib.util
@@ -22,7 +22,7 @@ BUILT_IN = Path(__file__).parent
 
 
 class _Source(SourceFileLoader):
-    """Loads a user's file from its source alone: leaves nothing beside it and never misses a change."""
+    """Loads a user's file from its source only: it writes no cache files and sees every change."""
 
     def get_code(self, fullname: str) -> CodeType:
         return self.source_to_code(self.get_data(self.path), self.path)
@@ -41,7 +41,7 @@ def _module(path: Path) -> ModuleType:
     sys.modules[spec.name] = module  # inspect.getsource needs to find it
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # whatever a user's file raises is bad input, not a failure of ours
+    except Exception as error:  # any exception of a user's file is bad input, not an internal failure
         raise InputError(
             f"{path}: this element file does not load: {type(error).__name__}: {error}"
         ) from error
@@ -58,7 +58,7 @@ def load_element(path: Path) -> Element:
 
 
 def _check_arguments(element: Element, path: Path) -> None:
-    """Raise InputError where what an element computes with does not take what it is given."""
+    """Raise InputError where the functions of an element do not accept their arguments."""
     leading = {"delay": ("stamps",), "sampler": ("rng",)}
     what = next(name for name in ("kernel", "delay", "sampler") if getattr(element, name) is not None)
     expected = (
@@ -66,9 +66,9 @@ def _check_arguments(element: Element, path: Path) -> None:
     )
     try:
         given = tuple(inspect.signature(getattr(element, what)).parameters)
-    except (TypeError, ValueError):  # no text of ours, which is told where it is to be compiled
+    except (TypeError, ValueError):  # not Python source; this is reported when it is compiled
         return
-    # a kernel is called by position, so that it may call what it is given as it likes, but not in another order
+    # a kernel is called by position, so its argument names are free but not their order
     fits = given == expected if what in leading else len(given) == len(expected)
     if not fits or (given != expected and set(given) == set(expected)):
         kind = f"slot={element.slot!r}" + (f", acts={element.acts!r}" if what == "kernel" else "")
@@ -108,11 +108,12 @@ class Catalogue(Mapping[str, Element]):
         return len(self.elements)
 
     def without(self, *names: str) -> "Catalogue":
-        """The catalogue less the named elements."""
+        """The catalogue without the named elements."""
         return Catalogue({name: element for name, element in self.elements.items() if name not in names})
 
     def within(self, scales: Scales) -> "Catalogue":
-        """The catalogue with every element kept to what its name says in records of these scales."""
+        """The catalogue with every element limited to the range in which its name applies, for records with these
+        scales."""
         return Catalogue({name: element.within(scales) for name, element in self.elements.items()})
 
 

@@ -1,32 +1,32 @@
-"""The shape that all elements share: one physical effect, in one file, with everything the rest needs to know of it.
+"""The common form of all elements: one physical effect in one file, with all information that other modules need.
 
-A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these says what the effect does:
+A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these functions defines the effect:
 
 - `kernel`   a pure numeric function of one instant, compiled into the simulator. Its arguments by slot:
                command, actuator   (f, t, <parameters>, <borrowed>, <states>, <memories>) -> new f
                command, `acts="feedback"`    (f, x, v, t, <parameters>, …)               -> force, of a controller
                command, `acts="observation"` (x, v, t, <parameters>, …)                  -> x, v as controllers see them
-               actuator, `acts="transducer"` (f, x, v, t, <parameters>, …)               -> new f, which feels the motion
+               actuator, `acts="transducer"` (f, x, v, t, <parameters>, …)               -> new f, which depends on the motion
                force               (x, v, t, f, <parameters>, …)                         -> force on the mass
                force, `acts="transmission"`  (load, x, v, t, f, <parameters>, …)         -> force on the mass
                force, `acts="modifier"`      (leg, x, v, t, f, <parameters>, …)          -> new sum of the leg's forces
                force, `acts="constraint"`    (acceleration, yielding, x, v, t, f, <parameters>, …) -> force on the mass
                force, `acts="drive"`         (t, <parameters>, …)                        -> added to f before the actuator
                sensor              (y, t, <parameters>, …)                               -> new y
-             `acts` says which motion x and v are, where the input displaces the base: of the mass relative to the base
-             ("leg", the default, "transmission", "modifier", "constraint", "transducer"), or in the room ("body"). "load" is the sum of
-             the forces on the mass but for the actuator's and for friction and damping: what a gear carries besides f.
-             A constraint's force depends on the acceleration that it takes part in: in a simulation it is given the `acceleration`
-             that there would be without it and the `yielding`, by which a unit of its force changes that; along a motion that was
-             measured the whole acceleration, and a yielding of 0.
-             A kernel with states or memories returns (result, dstate/dt, …, new memory, …). It may use `math` and nothing
-             else. A memory is what an operator (play, a limit of rate) remembers: it takes the kernel's new value
-             where an integration step begins and where it ends, and keeps it between. `ELAPSED` is the time since it began.
-             A kernel with a `history` is given last, for each signal named there, what that was a `dead_time` ago.
-- `delay`    (stamps, **parameters) -> seconds; how much later a command acts, or how much older a measurement is
-             than its stamp says. Shapes (n,) -> (n,).
-- `sampler`  (rng, **parameters) -> f(stamps, samples) -> samples; what happens to samples one after another
-             (noise, rounding). It may remember; feeding it in chunks gives what feeding it whole gives.
+             Where the input displaces the base, `acts` says which motion x and v are: that of the mass relative to the base
+             ("leg", the default, "transmission", "modifier", "constraint", "transducer"), or in the room ("body"). "load" is the
+             sum of the forces on the mass without the actuator's and without friction and damping: the load of a gear besides f.
+             A constraint's force depends on an acceleration to which it contributes. In a simulation it is given the
+             `acceleration` without it and the `yielding`, the change of the acceleration per unit of its force. Along a measured
+             motion it is given the whole acceleration, and a yielding of 0.
+             A kernel with states or memories returns (result, dstate/dt, …, new memory, …). It may use only `math`. A memory is
+             the memory state of an operator (play, rate limit): it takes the kernel's new value at the start and at the end of an
+             integration step, and is constant between. `ELAPSED` is the time since the step's start.
+             A kernel with a `history` is given last, for each signal named there, its value a `dead_time` earlier.
+- `delay`    (stamps, **parameters) -> seconds; delay of a command's action, or age of a measurement, relative to its stamp.
+             Shapes (n,) -> (n,).
+- `sampler`  (rng, **parameters) -> f(stamps, samples) -> samples; an operation on successive samples (noise, rounding). It
+             may have a memory; the result must be the same for chunks and for the whole.
 """
 
 from collections.abc import Callable, Mapping
@@ -40,16 +40,17 @@ from numpy.typing import NDArray
 from rhythmid.elements.first_guess import generic_guesses
 
 Slot = Literal["command", "actuator", "force", "sensor", "timing"]
-STEP = "simulation.step"  # borrowed under this name: the largest integration step [s], which no effect can be faster than
-LONGEST_DEAD_TIME = 1.0  # [s] of an element with a history: what is kept of the past grows with it
+# borrowed under this name: the largest integration step [s], the lower limit for the time scale of an effect
+STEP = "simulation.step"
+LONGEST_DEAD_TIME = 1.0  # [s] of an element with a history: the stored past grows with it
 ELAPSED = "simulation.elapsed"  # borrowed under this name: the time [s] since the integration step began
 SLOTS: tuple[Slot, ...] = ("command", "actuator", "force", "sensor", "timing")
 Acts = Literal[
     "body", "leg", "transmission", "modifier", "constraint", "drive", "feedback", "observation", "transducer"
 ]
 Against = Literal["base", "room"]
-DISSIPATIVE = ("friction", "damping")  # families whose forces are no load that a gear carries, but losses
-LEADING: Mapping[tuple[Slot, Acts], tuple[str, ...]] = {  # what a kernel is given before its parameters
+DISSIPATIVE = ("friction", "damping")  # families whose forces are losses, not a load of a gear
+LEADING: Mapping[tuple[Slot, Acts], tuple[str, ...]] = {  # a kernel's arguments before its parameters
     ("command", "leg"): ("f", "t"),
     ("command", "feedback"): ("f", "x", "v", "t"),
     ("command", "observation"): ("x", "v", "t"),
@@ -70,10 +71,10 @@ Sampler = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float6
 class Parameter:
     """A parameter of an element.
 
-    `unit` is written for a translational machine (kg, m, s, N); a rotational or otherwise scaled model translates it.
-    `default` is what a model file may leave out; None makes the parameter mandatory. A parameter that is `fixed` is not
-    estimated unless a model file says `fixed: false`: a seed, a side, an exponent. The effect is the same again a `turn`
-    further on: a phase.
+    `unit` is written for a translational machine (kg, m, s, N); a rotational or otherwise scaled model translates
+    it. `default` is used where a model file gives no value; None makes the parameter mandatory. A `fixed` parameter
+    is not estimated unless a model file says `fixed: false`: a seed, a side, an exponent. A `turn` is the period of
+    a parameter with a periodic effect, such as a phase.
     """
 
     name: str
@@ -87,7 +88,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Scales:
-    """What a record tells about sizes, in the model's units: the yardstick for first guesses of parameters."""
+    """Scales of a record in the model's units, used for first guesses of parameters."""
 
     position: float  # standard deviation of the measured position
     velocity: float  # of its rate
@@ -110,7 +111,7 @@ class Scales:
     rest: float | None = None  # position at which the model's linear spring is at rest, where that is known
     displaced_base: bool = False  # whether the input displaces the base that the leg stands on
     idle: bool = False  # whether no command, forcing or controller drives the machine: it moves freely
-    swings: tuple[float, float] = (0.0, 0.0)  # [Hz] lowest and highest frequency of a free motion's swings
+    swings: tuple[float, float] = (0.0, 0.0)  # [Hz] lowest and highest frequency of a free oscillation
 
     @property
     def force(self) -> float:
@@ -119,13 +120,14 @@ class Scales:
 
     @property
     def inside(self) -> tuple[float, float]:
-        """The travel without a twentieth of it at either end: a kink further out is but an offset of the rest."""
+        """The travel without a twentieth of it at either end: a kink further out is only an offset of the rest
+        position."""
         margin = 0.05 * (self.high - self.low)
         return self.low + margin, self.high - margin
 
     @property
     def turning(self) -> tuple[float, float]:
-        """Speeds over which dry friction may turn: where the motion does not leave them, it is but a damper."""
+        """Transition speeds for dry friction: where the motion stays within them, the friction is only a damper."""
         return 0.0, 2.0 * self.velocity
 
     @property
@@ -144,25 +146,26 @@ class Element:
     """One physical effect.
 
     `borrows` maps a kernel argument to (parameter of another element, value when the model has no such element;
-    None makes that element a condition for using this one); `STEP` and `ELAPSED` are always there. `size` names the parameter that
-    measures how much of the effect there is; with it at `absent` the model behaves as without the element, whatever its
-    other parameters. A `rigid` effect keeps its name however large that is: a stop may be too stiff for records to say how stiff.
-    `starts` proposes first guesses of physical size from the record's scales, several where the shape
-    matters. `special_case_of` names richer elements that contain this one, exactly or in a limit of their parameters;
-    `confusable` maps another element's name to what tells the two apart. A `rotational` effect needs an angle for x, a
-    `controlled` one a controller in the model, one of a `displaced_base` an input that moves the base.
-    `ranges` bounds parameters by the record's scales to where the effect still is what its name says: a ripple repeats
-    within the travel, or it is but another spring. `hops` says how far apart the minima lie at most that a fit has in a parameter.
-    `needless_with` names elements, or as "element.parameter" parameters that are estimated, beside which another candidate
-    or the nominal model says the same. `against` says whether a friction or a damper acts between mass and base or between
-    mass and room; None where that is no choice. `takes` is the unit of the signal that an actuator is fed with, where that
-    is no force. `clock` names the parameter that is the period of a clock of its own, which no descent finds: a fit seeks
-    it on a grid as fine as the ticks of the last second of a record ask for. `width` names the parameter of a resonance that is its width
-    as a share of its frequency. `history` names signals that a kernel is given, and
-    wants as they were earlier, too, by the time that the parameter `dead_time` says; before a simulation's start they are what
-    command and forcing were, with the machine's states led back along their first rates.
-    `switches` says where its force changes form: at the value of a parameter, its own or one that it borrows, of position "x" or
-    velocity "v"; at zero where that is "". A machine may have one that `repeats` several times, each with parameters of its own.
+    None makes that element a condition for using this one). `STEP` and `ELAPSED` are always available. `size` names
+    the parameter that scales the effect: at its value `absent` the model behaves as without the element, whatever
+    its other parameters. A `rigid` effect is reported whatever its size: a stop may be too stiff for its stiffness
+    to be identifiable. `starts` proposes first guesses from the record's scales, several where the shape matters.
+    `special_case_of` names more general elements that contain this one, exactly or in a limit of their parameters.
+    `confusable` maps another element's name to an experiment or property that distinguishes the two. A `rotational`
+    effect needs an angle for x, a `controlled` one a controller in the model, one of a `displaced_base` an input
+    that moves the base. `ranges` limits parameters, by the record's scales, to values for which the element's name
+    applies: a ripple repeats within the travel, otherwise it is only another spring. `hops` is the largest distance
+    of the local minima of a fit in a parameter. `needless_with` names elements, or as "element.parameter" estimated
+    parameters, beside which this element adds nothing to another candidate or to the nominal model. `against` says
+    whether a friction or a damper acts between mass and base or between mass and room; None where there is no
+    choice. `takes` is the unit of an actuator's input signal, where that is not a force. `clock` names the
+    parameter that is the period of an independent clock. No descent finds it: a fit searches it on a grid as fine
+    as the ticks in the last second of a record require. `width` names the parameter of a resonance that is its
+    relative bandwidth. `history` names signals of which a kernel also needs the value a time `dead_time` earlier
+    (the name of a parameter). Before a simulation's start these follow from command and forcing, with the machine's
+    states extrapolated back along their first rates. `switches` says where the force changes form: at the value of
+    a parameter, its own or a borrowed one, of position "x" or velocity "v"; "" means zero. A machine may have an
+    element that `repeats` several times, each with its own parameters.
     """
 
     name: str
@@ -189,16 +192,16 @@ class Element:
     size: str = ""
     absent: float = 0.0
     rigid: bool = False
-    candidate: bool = True  # takes part in the search for missing physics
+    candidate: bool = True  # used in the search for missing effects
     needless_with: tuple[str, ...] = ()
-    same_as: tuple[str, ...] = ()  # elements that make one and the same model, with other parameters
+    same_as: tuple[str, ...] = ()  # elements that give the same model with other parameters
     same_beside: Mapping[str, str] = field(
         default_factory=dict
-    )  # beside which element it is the same as which other
-    rotational: bool = False  # makes sense only where the position is an angle
-    controlled: bool = False  # makes sense only where a controller in the command path closes the loop
-    displaced_base: bool = False  # says what another does not only where the input displaces the base
-    driven: bool = False  # says nothing where the actuator makes no force, as commands and actuators do
+    )  # equivalences that hold beside another element
+    rotational: bool = False  # applies only where the position is an angle
+    controlled: bool = False  # applies only where a controller in the command path closes the loop
+    displaced_base: bool = False  # differs from another element only where the input displaces the base
+    driven: bool = False  # has no effect without an actuator force, as commands and actuators
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
     ranges: Callable[[Scales], Mapping[str, tuple[float, float]]] | None = None
     hops: Callable[[Scales], Mapping[str, float]] | None = None
@@ -235,12 +238,12 @@ class Element:
 
     @property
     def leading(self) -> tuple[str, ...]:
-        """Signals that its kernel is given first; none without a kernel."""
+        """Signals that are the first arguments of its kernel; empty without a kernel."""
         return LEADING[self.slot, self.acts] if self.kernel is not None else ()
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Names for what its kernel is given, in order."""
+        """Names of its kernel's arguments, in order."""
         own = (parameter.name for parameter in self.parameters)
         return (*self.leading, *own, *self.borrows, *self.own, *(f"past_{name}" for name in self.history))
 
@@ -250,7 +253,7 @@ class Element:
 
     @property
     def own(self) -> tuple[str, ...]:
-        """What it adds to the state vector: its states, then its memories."""
+        """Its entries in the state vector: its states, then its memories."""
         return (*self.states, *self.memories)
 
     def parameter(self, name: str) -> Parameter:
@@ -261,8 +264,8 @@ class Element:
         raise KeyError(name)
 
     def forbids(self, values: Mapping[str, float], factor: float) -> bool:
-        """Whether `factor` times the effect with these values has a sign that physics forbids: it would lie beyond a bound on the
-        other side of which all sizes are."""
+        """Whether `factor` times the effect with these values has a physically impossible sign: the size would be
+        beyond a bound that restricts it to one sign."""
         if not self.size:
             return False
         if isinf(self.absent):
@@ -291,8 +294,8 @@ class Element:
         )
 
     def first_guesses(self, scales: Scales) -> list[dict[str, float]]:
-        """What `starts` proposes for these scales; without `starts`, guesses from the parameters' units and bounds.
+        """First guesses of `starts` for these scales; without `starts`, guesses from the parameters' units and bounds.
 
-        Empty where the effect says that the motion does not show it. Raises NoGuess with the reason where there is no telling.
+        Empty where the motion does not show the effect. Raises NoGuess with the reason where no guess is possible.
         """
         return self.starts(scales) if self.starts is not None else generic_guesses(self, scales)

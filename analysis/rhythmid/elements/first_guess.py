@@ -1,7 +1,8 @@
-"""First guesses for elements that propose none: each parameter from its unit, its bounds and the scales of the records.
+"""First guesses for elements without `starts`: each parameter from its unit, its bounds and the scales of the records.
 
-A guess needs no more than the right order of magnitude: what the score test measures is scaled to the data, and a refit does
-the rest. The shares are those of the built-in elements' own guesses: an effect of a few per cent of the machine's forces.
+A guess only needs the right order of magnitude: the score test scales its effect to the data, and a refit does the
+rest. The shares are those of the built-in elements' own guesses: an effect of a few per cent of the machine's
+forces.
 """
 
 import math
@@ -12,13 +13,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rhythmid.elements.element import Element, Parameter, Scales
 
-FORCE = 0.02  # of the leg's typical force
-COEFFICIENT = 0.05  # of a stiffness, a damping, or any other force per power of position and speed
-MASS = 0.03  # of the machine's
-MOTION = 0.2  # of its position, speed or acceleration
-CYCLE = 0.02  # of a period of the motion, as a time
-PLAIN = 0.1  # of what has no unit
-FURTHER = 4.0  # times these, the lengths, speeds and times of a second guess
+FORCE = 0.02  # share of the leg's typical force
+COEFFICIENT = 0.05  # share of a stiffness, a damping, or any other force per power of position and speed
+MASS = 0.03  # share of the machine's mass
+MOTION = 0.2  # share of its position, speed or acceleration
+CYCLE = 0.02  # share of a period of the motion, as a time
+PLAIN = 0.1  # value of a dimensionless parameter
+FURTHER = 4.0  # factor of lengths, speeds and times in a second guess
 GUESSES = (  # the same in words, for the reference page
     f"for N {FORCE:g} of the typical force; for N/m, N*s/m and similar units {COEFFICIENT:g} of the coefficient that gives that force; "
     f"for kg {MASS:g} of the mass; for m, m/s and m/s^2 {MOTION:g} of the motion; for s {CYCLE:g} of its period; for Hz its frequency; "
@@ -31,18 +32,18 @@ SHAPES = (
     "s",
     "1/m",
     "1/s",
-)  # units of parameters that say where or how fast, not how much
+)  # units of parameters for a location or a rate rather than a size
 
 
 class NoGuess(Exception):
-    """Why an element gets no first guess."""
+    """Reason why an element gets no first guess."""
 
 
 def generic_guesses(element: "Element", scales: "Scales") -> list[dict[str, float]]:
-    """First guesses from units, bounds and scales: two where a length, a speed or a time is to be guessed, for a phase two.
+    """First guesses from units, bounds and scales: two where a length, a speed or a time is guessed, two for a phase.
 
-    A parameter with a default keeps it, unless it is the effect's size. Raises NoGuess with the reason where a parameter's unit
-    says nothing, or where its bounds leave nothing.
+    A parameter with a default keeps it, unless it is the effect's size. Raises NoGuess with the reason where a
+    parameter's unit gives no scale, or where its bounds exclude all guesses.
     """
     if math.isinf(element.absent):
         raise NoGuess(
@@ -70,12 +71,12 @@ def generic_guesses(element: "Element", scales: "Scales") -> list[dict[str, floa
 
 
 def _open(element: "Element", parameter: "Parameter") -> bool:
-    """Whether a parameter is guessed but says nothing of how much of the effect there is."""
+    """Whether a parameter is guessed but is not a size of the effect."""
     return parameter.default is None and parameter.name != element.size
 
 
 def _magnitude(parameter: "Parameter", scales: "Scales") -> float:
-    """A size of some consequence of a parameter in its unit."""
+    """A significant size of a parameter in its unit."""
     rate = scales.velocity / scales.position  # [1/s] angular frequency of the motion
     known = {
         "N": FORCE * scales.force,
@@ -108,7 +109,8 @@ def powers(unit: str) -> Iterator[tuple[str, int]]:
 
 
 def _inside(parameter: "Parameter", value: float) -> float:
-    """The value, or its mirror image, within the parameter's bounds; else the middle of finite ones, or the nearer one."""
+    """The value, or its mirror image, within the parameter's bounds; else the middle of finite bounds, or the
+    nearer bound."""
     low, high = parameter.bounds
     for one in (value, -value):
         if low <= one <= high:

@@ -1,4 +1,4 @@
-"""The places of the signal path in words, in which elements act."""
+"""Locations in the signal path at which elements act, in words."""
 
 from collections.abc import Mapping
 

@@ -160,7 +160,7 @@ def describe(element: Element) -> str:
 
 
 def _preamble() -> str:
-    """The page's introduction, its lists taken from what the code goes by."""
+    """The page's introduction, with lists generated from the code."""
     acts = "\n".join(
         f"- `{name}`: {what}{'; x and v ' + MOTION[name] if name in MOTION else ''}."
         for name, what in ACTS.items()

@@ -1,8 +1,9 @@
-"""Cramér-Rao bound: the smallest standard deviations that any unbiased estimator can reach, before or after the data.
+"""Cramér-Rao bound: the smallest standard deviations that any unbiased estimator can reach.
 
-The inverse of the Fisher information of the sampled output under Gaussian noise, with the initial states as nuisances
-(S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, 1993, section 3.9). The sensitivities are
-those of the estimator itself: the simulator's, parameter by parameter.
+It is the inverse of the Fisher information of the sampled output under Gaussian noise. The initial states are
+nuisance parameters (S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, 1993, section
+3.9). The sensitivities come from the estimator's own simulator. The bound can be computed before or after the data
+are recorded.
 """
 
 import math
@@ -24,12 +25,13 @@ from rhythmid.record.messages import Messages
 from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
-FINE = 0.05  # of a block, integrated in one step: at a delay that meets the samples' grid coarser ones mislead the differences
+# share of a block per integration step: when a delay meets the sample grid, coarser steps corrupt the finite differences
+FINE = 0.05
 
 
 @dataclass(frozen=True)
 class Bound:
-    """`covariance` (p, p) of the parameters `names` at best."""
+    """`covariance` (p, p) of the parameters `names` at the Cramér-Rao bound."""
 
     names: tuple[str, ...]
     covariance: Array
@@ -43,7 +45,7 @@ class Bound:
 
 
 def planned_record(experiment: Experiment) -> Record:
-    """What an experiment would record without noise: inputs, stamps, and a motion from which only the start is taken."""
+    """Record that an experiment would give without noise: inputs and timestamps. Of its motion only the start is used."""
     topics = perform(replace(experiment, noise=Noise()))
     command, forcing, output = topics["excitation"], topics["forcing"], topics["joint_states"]
     if output.position is None or command.effort is None or forcing.effort is None:
@@ -58,22 +60,22 @@ def planned_record(experiment: Experiment) -> Record:
 
 
 def _seconds(messages: Messages) -> Array:
-    """Stamps [s] (n,)."""
+    """Timestamps [s] (n,)."""
     return messages.stamp_ns.astype(np.float64) * 1e-9
 
 
 def cramer_rao(model: Model, records: Record | Sequence[Record], std: float, cycle: bool = True) -> Bound:
-    """Bound at the model's own values for records with these inputs and stamps; arguments as for `expected_fit`."""
+    """Bound at the model's own values, for records with these inputs and timestamps; arguments as for `expected_fit`."""
     fit = expected_fit(model, records, std, cycle)
     return Bound(fit.names, fit.covariance)
 
 
 def expected_fit(model: Model, records: Record | Sequence[Record], std: float, cycle: bool = True) -> Fit:
-    """The fit at the model's own values whose covariance is the bound, for records with these inputs and stamps.
+    """The fit at the model's own values whose covariance is the bound, for records with these inputs and timestamps.
 
-    `std` [output unit] is that of a single sample's noise, which is white. Of the records' outputs only the start is
-    taken, so planned and real ones serve alike. With `cycle` False nothing is learnt from the limit cycle. Raises
-    InputError when `std` is not positive.
+    `std` [output unit] is the standard deviation of white noise on a single sample. Only the start of each record's
+    output is used, so planned and real records can both be given. With `cycle` False the limit cycle contributes no
+    information. Raises InputError when `std` is not positive.
     """
     if not std > 0.0:
         raise InputError(f"noise of {std:g} bounds nothing; give its standard deviation, greater than 0")

@@ -1,4 +1,4 @@
-"""Cautions: what should keep a user from believing an estimate, each with the question that decides it."""
+"""Cautions: reasons to doubt an estimate, each with the question that settles the doubt."""
 
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
@@ -10,7 +10,7 @@ GIVEN_VALUES = "Are the values that the model is given near the machine's? If so
 
 @dataclass(frozen=True)
 class Caution:
-    """What to doubt, in words, and the `question` that decides it; with the parameter, the value found and the nominal one."""
+    """A doubt in words and the `question` that settles it, with the parameter, its estimate and its nominal value."""
 
     name: Name
     text: str
@@ -25,7 +25,7 @@ class Caution:
 
 
 def not_identified(motion: float, response: float | None) -> Caution:
-    """A fit that leaves too much of the `motion`, or of the `response` to the command (rms shares), to be an answer."""
+    """The fit leaves too much of the `motion`, or of the `response` to the command, unexplained (shares of the rms)."""
     left = f"{100.0 * motion:.0f} % of the motion" if motion < 1.0 else "more than all of the motion"
     if response is not None:
         left = f"{100.0 * min(response, 9.99):.0f} % of the response to the command"
@@ -37,5 +37,5 @@ def not_identified(motion: float, response: float | None) -> Caution:
 
 
 def other_unit(text: str) -> Caution:
-    """Values that are all shifted as another unit of a channel would shift them."""
+    """All values are shifted in the way that another unit of a channel would shift them."""
     return Caution("other_unit", text, "In which unit was the channel recorded?")

@@ -1,4 +1,4 @@
-"""What a user may have declared wrongly of a record's channels, how the record would be without it, and how to mend it in words."""
+"""Wrong declarations of a record's channels: the likely ones, the corrected record, and advice in words."""
 
 import math
 from dataclasses import dataclass, replace
@@ -11,11 +11,11 @@ from rhythmid.record.record import Channel, Record
 from rhythmid.report.quantity import number
 
 Role = Literal["output", "input", "forcing", "exchange"]
-NAMED = 0.15  # relative distance from a unit's factor within which a found gain is that unit
+NAMED = 0.15  # relative distance of an estimated gain from a unit's factor within which the unit is named
 DEGREE = math.pi / 180.0
 THOUSAND = (1e-3, 1e3)
 MOTIONS = ("reference", "base_displacement")  # kinds of input that have the unit of the position
-# what a recorded quantity looks like where it has to be multiplied by the factor
+# name of the unit in which a quantity seems to be recorded, by the factor that converts it
 UNITS = {
     "rad": {DEGREE: "degrees", 1e-3: "milliradians", 1.0 / DEGREE: "radians that were taken for degrees"},
     "m": {1e-3: "millimetres", 1e3: "kilometres"},
@@ -26,16 +26,16 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Change:
-    """How a record's channels may have been meant: one of them times `factor`, or input and output exchanged."""
+    """A correction of a record's channels: one channel times `factor`, or input and output exchanged."""
 
     role: Role
     factor: float = 1.0
 
     def applied(self, record: Record) -> Record | None:
-        """The record so changed; None where it has no such channel."""
+        """The corrected record; None where the record has no such channel."""
         if self.role == "exchange":
             if record.input is None or record.input_kind != "force" or np.ptp(record.input.value) == 0.0:
-                return None  # what never changes is no motion
+                return None  # a constant signal is no motion
             return replace(record, output=record.input, input=record.output)
         channel: Channel | None = getattr(record, self.role)
         if channel is None or np.ptp(channel.value) == 0.0:
@@ -48,7 +48,7 @@ class Change:
 
 
 def likely_changes(record: Record, model: Model) -> list[Change]:
-    """Changes by a unit or a sign that the record's channels may need, the likelier of two that do the same first."""
+    """Changes of unit or sign that the record's channels may need. Of two with the same effect, the likelier is first."""
     position = model.units.position
     degrees = (DEGREE, 1.0 / DEGREE) if position == "rad" else ()
     found = [Change("output", factor) for factor in (*degrees, *THOUSAND)]
@@ -68,7 +68,7 @@ def instruction(change: Change) -> str:
 
 
 def guess(change: Change, record: Record, model: Model) -> str:
-    """What the changed channel seems to be."""
+    """What the channel seems to contain, in words."""
     if change.role == "exchange":
         return "input and output seem to be exchanged"
     if change.factor == -1.0:

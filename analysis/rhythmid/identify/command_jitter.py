@@ -1,10 +1,12 @@
-"""Jitter of commands: single commands act earlier or later than their mean delay, which a machine that is lightly damped remembers.
+"""Jitter of commands: single commands act earlier or later than their mean delay. A lightly damped machine stores
+the effect.
 
-A command that is late by ε gives the machine the impulse −ε ΔF, with ΔF the step of the command. What a record shows of that has the
-colour of the machine's own response, and in a record of a few decay times that cannot be told from what is left of a fit: the fit has
-taken most of it for parameters. It can be simulated, though: runs whose commands jitter tell the colour, and the size of the
-innovations, of which there are many, the standard deviation of the jitter. That it is jitter shows in innovations that are the
-larger, the larger the steps of the command were just then, and that do not follow from the command itself as what a model lacks would.
+A command that is late by ε gives the machine the impulse −ε ΔF, where ΔF is the step of the command. The effect in
+the record has the spectrum of the machine's own response. In a record of a few decay times it cannot be
+distinguished from other residuals, because the fit has absorbed most of it into the parameters. It can be
+simulated, however. Runs with jittered commands give the spectrum; the size of the many innovations gives the
+standard deviation of the jitter. Jitter shows in innovations that are larger where the command's steps were larger.
+They must not follow from the command itself, as the effect of a missing element would.
 """
 
 import math
@@ -22,8 +24,9 @@ from rhythmid.identify.series import Series
 from rhythmid.simulation.signal import is_held
 
 Array = NDArray[np.float64]
-RUNS = 16  # with simulated jitter, of all series together at least
-TRIED = 0.05  # of a sample period: standard deviation of the simulated jitter, small enough that its effect is linear
+RUNS = 16  # least number of simulations with jitter, over all series together
+# standard deviation of the simulated jitter, in sample periods: small enough for a linear effect
+TRIED = 0.05
 WHITE = (
     0.0,
     0.05,
@@ -31,24 +34,24 @@ WHITE = (
     0.2,
     0.4,
     0.8,
-)  # noise of the measurement beside the jitter's, as a share of one innovation of all that is left
-LEAST_LIKELIHOOD_GAIN = (
-    12.5  # in log likelihood over the colour that the residuals have by themselves: five standard deviations
-)
-LEAST_GROWING_SHARE = 0.5  # share of the innovations' power that has to grow with the command's steps
-SHOWN = 5.0  # standard deviations from which innovations grow with the command's steps
-FOLLOWED = (
-    0.5  # share of the innovations that may follow from the command: beyond it the model lacks something
-)
-LAGS = 8  # blocks of the command from which they may
-LEAST_COMMANDS = 500  # commands and blocks of a series, below which its own half tells no colour
-SEED = 20  # of the simulated jitter, so that an answer is the same each time
+)  # white measurement noise beside the jitter, as a share of one innovation of the whole residual
+# gain in log likelihood over the residuals' own noise spectrum: five standard deviations
+LEAST_LIKELIHOOD_GAIN = 12.5
+LEAST_GROWING_SHARE = 0.5  # least share of the innovations' power that grows with the command's steps
+SHOWN = 5.0  # standard deviations by which this growth must differ from zero
+# largest share of the innovations that may follow from the command; beyond it the model lacks an effect
+FOLLOWED = 0.5
+LAGS = 8  # delays of the command, in blocks, from which the innovations may follow
+# least number of commands and of blocks in a series; with fewer, half of it gives no noise spectrum
+LEAST_COMMANDS = 500
+SEED = 20  # of the simulated jitter, so that results are reproducible
 
 
 @dataclass(frozen=True)
 class CommandJitter:
-    """Jitter of commands: standard deviation `std` [s], how well that is known [s], and the noise model of what it excites beside the
-    measurement's own noise. It lies between what all innovations would take, and what those that grow with the command's steps do."""
+    """Jitter of commands: standard deviation `std` [s], its uncertainty [s], and the model of the noise that jitter
+    and measurement cause together. `std` lies between two limits: all innovations are due to jitter, or only the
+    share that grows with the command's steps is."""
 
     std: float
     uncertainty: float
@@ -56,7 +59,7 @@ class CommandJitter:
 
     @property
     def words(self) -> str:
-        """What is said of it, in one sentence."""
+        """One sentence that describes the jitter."""
         return (
             f"single commands act earlier or later than the input delay says, by {1e3 * self.std:.3g} ± {1e3 * self.uncertainty:.1g} ms "
             "(standard deviation); what that excites is weighed as noise of the machine's own colour"
@@ -64,13 +67,13 @@ class CommandJitter:
 
 
 def command_jitter(fit: Fit) -> CommandJitter | None:
-    """Jitter of held commands, from what the free runs of a fit leave; None where it does not show."""
+    """Jitter of held commands, estimated from the residuals of a fit; None where no jitter is detected."""
     if not all(_held(one) for one in fit.run.series):
         return None
     left = [r[part] for r, one in zip(fit.residuals, fit.run.series) for part in runs(one.used)]
     whole = sum(len(r) for r in left)
     usual = burg(left)
-    if whole == 0 or _growing_share(fit, usual) < LEAST_GROWING_SHARE:  # before any run is simulated
+    if whole == 0 or _growing_share(fit, usual) < LEAST_GROWING_SHARE:  # checked before any simulation is run
         return None
     std = TRIED * fit.run.series[0].period
     simulated = _simulated(fit, std)
@@ -100,7 +103,7 @@ def command_jitter(fit: Fit) -> CommandJitter | None:
 
 
 def weighed(fit: Fit, jitter: CommandJitter) -> Fit:
-    """The fit with what jitter of the commands excites as its noise."""
+    """The fit with the effect of command jitter as its noise model."""
     series = [replace(one, colour=jitter.noise) for one in fit.run.series]
     run = replace(fit.run, series=tuple(series))
     return minimise(fit.model, run, fit.names, jitter.noise, fit.starts)
@@ -114,8 +117,8 @@ def _held(one: Series) -> bool:
 
 
 def _simulated(fit: Fit, std: float) -> list[Array]:
-    """What jitter of this standard deviation [s] adds to the outputs, stretch by stretch, after half of each series: before, the machine
-    has not taken up as much as it lets go."""
+    """Change of the outputs by jitter of this standard deviation [s], stretch by stretch. Only the second half of
+    each series is returned: in the first half the machine still gains more energy from the jitter than it loses."""
     rng, found = np.random.default_rng(SEED), []
     base = _stopping(fit.run, fit.run.series).outputs(fit.model, fit.starts)
     for _ in range(max(1, RUNS // len(fit.run.series))):
@@ -128,14 +131,15 @@ def _simulated(fit: Fit, std: float) -> list[Array]:
 
 
 def _stopping(run: FreeRun, series: Sequence[Series]) -> FreeRun:
-    """The run over these series with steps that end at the knots of the commands: what it errs by is far below what jitter does."""
+    """The run over these series with steps that end at the commands' knots: the integration error is then far below
+    the effect of jitter."""
     for index, one in enumerate(series):
         run = with_series(run, index, one)
     return run
 
 
 def _jittered(command: PPoly | None, std: float, rng: np.random.Generator) -> PPoly | None:
-    """A held command whose steps come earlier or later."""
+    """A held command whose steps come earlier or later by a uniform random time of standard deviation `std` [s]."""
     if command is None:
         return None
     knots = command.x.copy()
@@ -144,19 +148,19 @@ def _jittered(command: PPoly | None, std: float, rng: np.random.Generator) -> PP
 
 
 def _square(noise: NoiseModel, left: Sequence[Array]) -> float:
-    """Mean square of the innovations of what is left."""
+    """Mean square of the innovations of the residuals."""
     return float(np.mean(np.concatenate([noise.whiten(one) for one in left]) ** 2))
 
 
 def _growing_share(fit: Fit, noise: NoiseModel) -> float:
-    """Share of the innovations' power that grows with the squares of the command's steps; 0 where that does not show, or where they
-    follow from the command itself."""
+    """Share of the innovations' power that grows with the squares of the command's steps. It is 0 where no such
+    growth is significant, or where the innovations follow from the command itself."""
     innovations, squares, commands = [], [], []
     for residual, one in zip(fit.residuals, fit.run.series):
         assert one.command is not None
         knots, steps = one.command.x[1:-1], np.diff(one.command.c[-1])
         half = 0.5 * one.period * one.block
-        # what steps in a block shows in it and in the next: over both
+        # a step affects its own block and the next: sum over both
         ends = np.concatenate([one.centres[:1] - 3.0 * half, one.centres + half])
         summed = np.concatenate([[0.0], np.cumsum(steps**2)])[np.searchsorted(knots, ends)]
         square = np.diff(summed)

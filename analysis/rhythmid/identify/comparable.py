@@ -1,4 +1,4 @@
-"""Whether records can come from one machine in one set of units."""
+"""Whether records can come from one machine and be in the same units."""
 
 import math
 from collections.abc import Sequence
@@ -10,10 +10,10 @@ from rhythmid.identify.series import Series
 
 
 def check_comparable(series: Sequence[Series]) -> None:
-    """Raise InputError when records cannot come from one machine in one set of units.
+    """Raise InputError when records cannot come from one machine in the same units.
 
-    How much they vary tells the unit. Their levels alone do not: counters of many turns and encoders that were zeroed elsewhere
-    differ in them by any amount, which `record_zeros` estimates.
+    The unit shows in how much the outputs vary. The levels alone do not show it: multi-turn counters and encoders with
+    another zero shift them by any amount, which `record_zeros` estimates.
     """
     spread = [float(np.std(one.averaged)) for one in series]
     level = [float(np.mean(one.averaged)) for one in series]

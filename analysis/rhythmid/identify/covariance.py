@@ -1,4 +1,4 @@
-"""Covariance of a fit, and the parameters that it cannot tell from their bounds."""
+"""Covariance of a fit, and the parameters whose estimates are too close to a bound to be distinguished from it."""
 
 import math
 from collections.abc import Sequence
@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-# share of a parameter's effect that others cannot make, up to which it is rounding of the differences that sensitivities are taken from
+# a parameter's own share of its sensitivity, not reproduced by the others: below this it is rounding of the finite
+# differences
 OWN = 1e-5
-EDGE = 1e-3  # standard deviations from its bound, nearer than which a parameter is taken to be there
+# distance from a bound, in standard deviations, within which a parameter counts as being at the bound
+EDGE = 1e-3
 
 
 def covariance_of(jacobian: Array, priors: Sequence) -> Array:
@@ -28,7 +30,8 @@ def covariance_of(jacobian: Array, priors: Sequence) -> Array:
     eigenvalues, vectors = np.linalg.eigh(information)
     known = eigenvalues > 1e-11 * max(eigenvalues[-1], 1e-300)
     inverse = np.where(known, 1.0 / np.maximum(eigenvalues, 1e-300), 1e24)
-    # rounding gives every parameter a trace of an undetermined direction; only those whose effect the others can make are undetermined
+    # rounding gives every parameter a component in an undetermined direction; it counts only for parameters whose
+    # effect the others can reproduce
     if not known.all():
         vectors = np.where(~known & (_own_part(rows) > OWN)[:, None], 0.0, vectors)
     with np.errstate(over="ignore"):
@@ -36,7 +39,7 @@ def covariance_of(jacobian: Array, priors: Sequence) -> Array:
 
 
 def _own_part(rows: Array) -> Array:
-    """Share (p,) of each column of rows (n, p), of unit norm, that the other columns cannot make."""
+    """Share (p,) of each unit-norm column of rows (n, p) that the other columns cannot reproduce."""
     triangle = np.linalg.qr(rows).R
     found = []
     for i in range(rows.shape[1]):
@@ -47,7 +50,7 @@ def _own_part(rows: Array) -> Array:
 
 
 def on_the_edge(model: Model, names: Sequence[str], covariance: Array) -> dict[str, float]:
-    """Bounds of the parameters that are very close to one for their uncertainty, but not on it."""
+    """Bounds of the parameters that lie within a small part of their standard deviation from a bound, but not on it."""
     found: dict[str, float] = {}
     for name, variance in zip(names, np.diag(covariance)):
         value = model.value(name)

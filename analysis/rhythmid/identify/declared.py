@@ -1,7 +1,7 @@
-"""Parameters that differ from record to record and are declared by the records, such as a controller's gain.
+"""Parameters with a value of their own in each record, declared by the record, such as a controller's gain.
 
-A declared value is known: it takes the place of the model's wherever that record is simulated, and what all records declare
-is not estimated.
+A declared value is known. It replaces the model's value wherever that record is simulated. A parameter that all
+records declare is not estimated.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from rhythmid.model import Model
 
 
 class Declaring(Protocol):
-    """A record, or a series made of one."""
+    """A record, or a series made from one."""
 
     @property
     def name(self) -> str: ...
@@ -23,9 +23,9 @@ class Declaring(Protocol):
 
 
 def own_model(model: Model, one: Declaring) -> Model:
-    """The model as it was in one record: with the values that this declares, fixed.
+    """The model with the values that one record declares, fixed.
 
-    Raises InputError, one line, where the model has no such parameter or its bounds exclude the value.
+    Raises InputError where the model has no such parameter or its bounds exclude the value.
     """
     if not one.parameters:
         return model
@@ -43,9 +43,9 @@ def own_model(model: Model, one: Declaring) -> Model:
 
 
 def with_declared(model: Model, records: Sequence[Declaring]) -> Model:
-    """The model for all of the records: what every one of them declares is fixed, at the mean of its values.
+    """The model for all records: a parameter that every record declares is fixed at the mean of the declared values.
 
-    Raises InputError where a record declares what the model does not have.
+    Raises InputError where a record declares a parameter that the model does not have.
     """
     for one in records:
         own_model(model, one)

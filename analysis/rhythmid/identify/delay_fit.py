@@ -1,7 +1,7 @@
 """Input and measurement delay from the phase of HTFs: the paper's equations (15) and (16), harmonic by harmonic.
 
-The phase error of harmonic m is linear in frequency with slope τ_u + τ_y and intercept −mω_p τ_u. So G_0 shows the sum
-alone, and every other harmonic both delays, τ_u modulo T/|m|.
+The phase error of harmonic m is linear in frequency with slope τ_u + τ_y and intercept −mω_p τ_u. So G_0 gives only
+the sum. Every other harmonic gives both delays, with τ_u known modulo T/|m|.
 """
 
 import math
@@ -17,15 +17,15 @@ from rhythmid.ltp.regularised_least_squares import HAT, HtfEstimate
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 UPPER_LIMIT_OF_INTEGRAL = 40.0  # [rad/s] upper limit of the integral in (16)
-LEAST_BINS = 4  # bins from which a phase can be read
-LARGEST = 1.0  # [s] largest sum of the delays that is considered
+LEAST_BINS = 4  # bins needed to fit a phase
+LARGEST = 1.0  # [s] largest sum of the delays that is searched
 
 
 @dataclass(frozen=True)
 class DelayEstimate:
-    """Delays [s] with standard deviations. `input` and `measurement` are None where only their `sum` is seen.
+    """Delays [s] with standard deviations. `input` and `measurement` are None where only their `sum` is identifiable.
 
-    `aliases` are further pairs (τ_u, τ_y), not negative, with the same phases; `error` is the root of the integral in (16).
+    `aliases` are further nonnegative pairs (τ_u, τ_y) with the same phases. `error` is the root of the integral in (16).
     """
 
     sum: float
@@ -62,7 +62,7 @@ class _Phase:
         return np.angle(np.exp(1j * turned))
 
     def cost(self, input_delay: float, measurement_delay: float) -> float:
-        """The sum that stands for the integral in (16)."""
+        """The sum that approximates the integral in (16)."""
         return float(np.sum((self.weight * self.left(input_delay, measurement_delay)) ** 2))
 
     def refine(self, delays: Array, directions: Array) -> tuple[Array, Array]:
@@ -87,14 +87,15 @@ MEASUREMENT_ALONE = np.array([[0.0], [1.0]])
 
 
 def _legible(estimate: HtfEstimate, m: int) -> NDArray[np.bool_]:
-    """Bins of harmonic m that the excitation reaches: those up to the limit of (16), or all where a machine works above it."""
+    """Bins of harmonic m that the excitation reaches, up to the limit of (16); all bins where the machine works
+    above that limit."""
     reached = estimate.reached[estimate.htf.row(m)]
     below = reached & (2.0 * np.pi * estimate.htf.frequency <= UPPER_LIMIT_OF_INTEGRAL)
     return below if below.sum() >= LEAST_BINS else reached
 
 
 def shows_delays(estimate: HtfEstimate, m: int) -> bool:
-    """Whether the excitation reaches harmonic m at enough frequencies to read delays from its phase."""
+    """Whether the excitation reaches harmonic m at enough frequencies to estimate delays from its phase."""
     return bool(_legible(estimate, m).sum() >= LEAST_BINS)
 
 
@@ -124,7 +125,7 @@ def _start(phase: _Phase, offset: bool) -> tuple[float, float]:
 
 
 def _independent(estimate: HtfEstimate) -> float:
-    """Bins that share their noise through the smoothing of (5)."""
+    """Number of independent bins: the smoothing of (5) correlates the noise of neighbouring bins."""
     operator = estimate.operator
     return max(1.0, 1.0 / (HAT * operator.window * operator.spectra.resolution))
 
@@ -137,8 +138,8 @@ def _scatter(estimate: HtfEstimate, phase: _Phase, delays: Array, fitted: int) -
 def fit_delays(estimate: HtfEstimate, model: Complex, m: int) -> DelayEstimate:
     """Paper, equation (16): (τ_u, τ_y) that minimise √∫₀⁴⁰ (|Ĝ_m| ∠G_err)² dω, from harmonic m alone.
 
-    `model` (h, n) are the parametric model's HTFs at the estimate's frequencies. Delays are sought that are not
-    negative. Raises InputError where the excitation does not reach the harmonic.
+    `model` (h, n) are the parametric model's HTFs at the estimate's frequencies. Only nonnegative delays are sought.
+    Raises InputError where the excitation does not reach the harmonic.
     """
     phase = _phase(estimate, model, m)
     slope, intercept = _start(phase, offset=m != 0)
@@ -156,7 +157,7 @@ def fit_delays(estimate: HtfEstimate, model: Complex, m: int) -> DelayEstimate:
     pairs = [free + n * alias * np.array([1.0, -1.0]) for n in range(-2, 2 + math.ceil(LARGEST / alias))]
     chosen = min(pairs, key=lambda pair: (round(float(np.sum(np.maximum(-pair, 0.0))), 9), pair[0]))
     delays = chosen
-    if np.any(delays < 0.0):  # on the boundary, as delays are causal
+    if np.any(delays < 0.0):  # delays are causal: take the optimum on the boundary
         edges = [
             phase.refine(np.array([0.0, max(0.0, chosen.sum())]), MEASUREMENT_ALONE)[0],
             phase.refine(np.array([max(0.0, chosen.sum()), 0.0]), INPUT_ALONE)[0],
@@ -175,7 +176,7 @@ def fit_delays(estimate: HtfEstimate, model: Complex, m: int) -> DelayEstimate:
 def combine_delays(
     estimate: HtfEstimate, model: Complex, harmonics: Sequence[int], start: tuple[float, float]
 ) -> DelayEstimate:
-    """(τ_u, τ_y) that satisfy (9) for several harmonics at once, each phase weighed by its noise."""
+    """(τ_u, τ_y) that satisfy (9) for several harmonics together, each phase weighted by its noise."""
     phases = [_phase(estimate, model, m, weigh_by_noise=True) for m in harmonics]
     joined = _Phase(
         *(

@@ -1,8 +1,8 @@
-"""Descent to the parameters and initial states that make the free run fit the records, by Levenberg and Marquardt's method.
+"""Levenberg-Marquardt search for the parameters and initial states whose free run fits the records.
 
-The initial state of every series is a nuisance: it is eliminated from each step by projection (variable projection,
-G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, in the form of L. Kaufman, BIT 15 (1975) 49), so the normal
-equations stay as small as the number of parameters however many series there are.
+The initial state of every series is a nuisance parameter. It is eliminated from each step by projection (variable
+projection, G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, in the form of L. Kaufman, BIT 15 (1975)
+49). So the size of the normal equations is the number of parameters, however many series there are.
 """
 
 import math
@@ -26,15 +26,16 @@ from rhythmid.model import Model
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, float] = MappingProxyType({})
 WHITE = NoiseModel(np.empty(0), 1.0)
-LEAST_DAMPING = 1e-6  # damping up to which a step counts as a full one
-STATES = 0.01  # damping beyond which a step holds every state back
-STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
-PACE = 3  # iterations over which the present rate of decline is taken
-BRINK = 1e-3  # share of its first distance within which it may reach the bound
+LEAST_DAMPING = 1e-6  # damping up to which a step counts as a full Gauss-Newton step
+STATES = 0.01  # damping above which every state is damped in a step
+# share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave again
+STAY = 0.1
+PACE = 3  # iterations over which the present rate of decline is measured
+BRINK = 1e-3  # share of the first distance below which a parameter may reach the bound
 
 
 def first_guess(model: Model, run: FreeRun) -> list[Array]:
-    """State at the first block of each series: position and slope of a straight line through its first samples."""
+    """State at the first block of each series: position and slope of a straight line fitted to its first samples."""
     found: list[Array] = []
     for index, one in enumerate(run.series):
         span = 0.05 / max(dominant_frequency(one), 1e-9)
@@ -70,7 +71,8 @@ def _settled_steps(
     residuals: Sequence[Array],
     similar: Mapping[str, float],
 ) -> tuple[Array, Array]:
-    """Difference steps of parameters (p,) and initial states (q,): those of a similar structure where it has them."""
+    """Finite-difference steps of parameters (p,) and initial states (q,), taken from a similar structure where it
+    has them."""
     run, names = problem.run, problem.names
     every = [*names, *run.compiled.layout.states]
     velocity = 2 * np.pi * max(dominant_frequency(one) for one in run.series) * problem.spread
@@ -85,8 +87,8 @@ def _settled_steps(
 def _step(
     jacobian: Array, residual: Array, damping: float, blocked: NDArray[np.bool_], least: Array, most: Array
 ) -> Array:
-    """Levenberg-Marquardt step (p,) in the parameters that are not blocked at a bound; one that would go beyond `least` or `most` (p,)
-    ends there, and the others are solved for again beside it."""
+    """Levenberg-Marquardt step (p,) in the parameters that are not blocked at a bound. A component that would pass
+    `least` or `most` (p,) stops there, and the step in the others is solved again."""
     free = ~blocked
     step = np.zeros(jacobian.shape[1])
     while free.any():
@@ -109,10 +111,10 @@ def _step(
 
 @dataclass(frozen=True)
 class Descent:
-    """Where a search for the best parameters ended: what a `Fit` holds, without the sensitivities there.
+    """End of a search for the best parameters: the content of a `Fit`, without the sensitivities there.
 
-    `differences` are the steps (p,) and (q,) of parameters and initial states by which sensitivities are taken;
-    `linearisation` is there where the last one was taken at the end itself.
+    `differences` are the finite-difference steps (p,) and (q,) of parameters and initial states for the sensitivities.
+    `linearisation` is present where the last one was computed at the end point itself.
     """
 
     model: Model
@@ -142,10 +144,12 @@ def descend(
 ) -> Descent:
     """Levenberg-Marquardt from the model's own values.
 
-    Stops when a further step lowers chi2, or promises to lower it, by less than `tolerance` (less where the noise model turns
-    out to be too wide) or 1e-7 of itself; and when chi2, falling on as it did in the last `PACE` iterations, would not come to
-    `reach` in those that are left; and where a deadline passes. `differences` are steps known from another descent of the same structure; without
-    them those of a `similar` one are taken, by name of parameter or state, and the others sought. Raises InputError when the model diverges at its initial values.
+    The search stops in three cases. A further step lowers chi2, or is predicted to lower it, by less than
+    `tolerance` (less where the noise model proves too wide) or by less than 1e-7 of chi2. Or chi2 would not come
+    down to `reach` in the iterations left, at the rate of the last `PACE` iterations. Or a deadline passes.
+    `differences` are finite-difference steps known from another descent of the same structure. Without them the
+    steps of a `similar` descent are taken, by name of parameter or state, and the missing ones are computed. Raises
+    InputError when the model diverges at its initial values.
     """
     problem = Problem(run, names, noise, pool)
     current = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]
@@ -203,7 +207,7 @@ def descend(
             moved, promised = [], _prior_cost(priors, proposed)
             for start, (error, slope, state) in zip(current, states):
                 ahead = error + slope @ step
-                # the other states are held back only where that of the parameters and memories did not help
+                # the other states are damped only where damping of parameters and memory states did not help
                 change = state_update(state, ahead, damping * np.where(damping > STATES, 1.0, held))
                 moved.append(start + change * state_steps)
                 promised += float(np.sum((ahead + state @ change) ** 2))
@@ -224,7 +228,7 @@ def descend(
             damping = max(damping * 10.0, LEAST_DAMPING)
             if damping > 1e8 or (cut := time_is_up()):
                 break
-        converged = converged or not (improved or cut)  # no direction lowers the cost any more
+        converged = converged or not (improved or cut)  # no direction lowers the cost further
         if converged and not searched:
             searched, moved = True, sought(problem, model, current, states, state_steps)
             trial_residuals = problem.residuals(model, moved)
@@ -260,14 +264,15 @@ def descend(
 
 
 def _message(converged: bool, iterations: int) -> str:
-    """How a descent ended."""
+    """How a descent ended, in words."""
     if converged:
         return "converged"
     return SPENT if iterations and time_is_up() else f"no convergence in {iterations} iterations"
 
 
 def out_of_reach(before: float, now: float, left: float, reach: float) -> bool:
-    """Whether chi2 that has come from `before` to `now` stays above `reach` when it falls by the same share `left` times more."""
+    """Whether chi2, which fell from `before` to `now`, stays above `reach` if it falls by the same ratio `left`
+    times more."""
     return now > reach and now * (now / before) ** left > reach
 
 

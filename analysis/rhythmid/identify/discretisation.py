@@ -1,8 +1,9 @@
-"""What discretisation does to estimates: an error that is no noise, and the only one where a record has none.
+"""Effect of discretisation on estimates: a systematic error, and the only error where a record has no noise.
 
-A fit integrates in steps of about a block and takes the average over a block's samples from differences between blocks. Both are
-repeated here as they should be, in steps of half the size and with every sample simulated. The difference, led through the
-estimator like a residual, tells by how much each estimate would move; its square belongs to the variance.
+A fit integrates in steps of about a block. It takes the average over a block's samples from differences between
+blocks. Here both approximations are removed: steps of half the size, and every sample simulated. The difference is
+passed through the estimator like a residual and gives the shift of each estimate. The square of the shift is added
+to the variance.
 """
 
 from dataclasses import replace
@@ -19,8 +20,8 @@ Array = NDArray[np.float64]
 
 
 def discretisation_error(fit: Fit) -> Array:
-    """Change of the output of all series when nothing is approximated, whitened, with what the initial states make up for left out:
-    in the rows (n,) of `fit.linearisation`. Zero where the model diverges."""
+    """Whitened change of all outputs when nothing is approximated, in the rows (n,) of `fit.linearisation`. The
+    part that the initial states can absorb is projected out. Zero where the model diverges."""
     problem = Problem(fit.run, fit.names, fit.noise, None)
     coarse = fit.run.outputs(fit.model, fit.starts)
     parts = []
@@ -35,7 +36,8 @@ def discretisation_error(fit: Fit) -> Array:
 
 
 def _block_averages(run: FreeRun, index: int, model: Model, start: Array) -> Array | None:
-    """Averages (blocks - 1,) of the output over the samples of all blocks but the first, in whose middle the `start` is."""
+    """Averages (blocks - 1,) of the output over the samples of all blocks but the first; `start` is the state at
+    the middle of the first."""
     one = run.series[index]
     later = one.time[one.block : one.blocks * one.block]
     times = np.concatenate([one.centres[:1], later])
@@ -48,7 +50,7 @@ def _block_averages(run: FreeRun, index: int, model: Model, start: Array) -> Arr
 
 
 def with_discretisation_error(fit: Fit) -> Fit:
-    """The fit whose covariance holds the error of discretisation, too."""
+    """The fit with the discretisation error added to its covariance."""
     known = np.isfinite(np.diag(fit.covariance))
     if not known.any():
         return fit

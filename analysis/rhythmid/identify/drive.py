@@ -1,7 +1,7 @@
-"""What drives the simulation of a record: its input, or where a controller works, its reference or the motor's effort.
+"""The channel that drives the simulation of a record: its input, a controller's reference or the motor's effort.
 
-A model whose command path holds a controller runs closed, from the reference; one without runs open, from the force
-that was commanded or measured.
+A model with a controller in its command path runs in closed loop from the reference. A model without one runs in
+open loop from the commanded or measured force.
 """
 
 from dataclasses import replace
@@ -18,9 +18,9 @@ def controlled(model: Model) -> bool:
 
 
 def driven(record: Record, model: Model) -> Record:
-    """The record with that channel as input which drives this model.
+    """The record with the channel that drives this model as its input.
 
-    Raises InputError where the model has a controller and the record no reference, or the other way round, and where the
+    Raises InputError where the model has a controller and the record no reference, or the reverse, and where the
     record declares parameters that the model does not have.
     """
     own_model(model, record)
@@ -51,7 +51,7 @@ def driven(record: Record, model: Model) -> Record:
 
 
 def drive_of(before: Record, after: Record) -> str | None:
-    """One sentence on what drives the simulation where `driven` chose another channel than the record's input."""
+    """One sentence that names the driving channel where `driven` chose another than the record's input; else None."""
     if after is before:
         return None
     channel: Channel | None = after.input

@@ -1,7 +1,7 @@
-"""An output that comes before the reference which it is said to follow: the channels are exchanged, or the reference was logged late.
+"""Detects an output that leads its reference: the channels are exchanged, or the reference was logged late.
 
-A controller answers after it is asked. Where the same motion shows in both channels, the time between them is that of their greatest
-correlation. It is measured in parts of the record, whose spread is its error.
+A controller responds after its reference changes. Where both channels show the same motion, the lag between them is
+at the maximum of their correlation. The lag is measured in several parts of the record; its spread gives the error.
 """
 
 import math
@@ -14,23 +14,24 @@ from rhythmid.record.record import Record
 from rhythmid.report.quantity import number, rounded
 
 Array = NDArray[np.float64]
-PARTS = 6  # of a record, each with a time of its own
-LEAST_SAMPLES = 64  # of a part: fewer tell no time
-FARTHEST = 0.25  # of a part, up to which a time is sought on either side
-# samples of the slower channel by which the output has to come early: an input that is not held, but taken for held, makes it one and a half
+PARTS = 6  # of a record, each with its own lag
+LEAST_SAMPLES = 64  # least samples in a part; fewer give no lag
+FARTHEST = 0.25  # largest lag on either side, as a share of a part
+# least lead, in samples of the slower channel: an input that is taken for held but is not gives a lead of 1.5 samples
 EARLIEST = 1.5
-SURE = 4.0  # standard errors by which it has to be beyond that, as for a delay that comes out negative
-# times what the best answer that comes late leaves, up to which the early one may leave: of one sine either comes after the other
+SURE = 4.0  # standard errors by which the lead must exceed that, as for a delay that comes out negative
+# largest ratio of the residual at the best lead to that at the best lag: with a single sine either channel seems to
+# follow the other
 PLAINLY = 0.5
 
 
 def early_outputs(records: Sequence[Record]) -> list[str]:
-    """A note for each record whose output comes before its reference."""
+    """A note for each record whose output leads its reference."""
     return [note for record in records if (note := early_output(record)) is not None]
 
 
 def early_output(record: Record) -> str | None:
-    """A note where the output comes before the reference; None where it does not, or the two are not the same quantity."""
+    """A note where the output leads the reference; None where it does not, or where the two are different quantities."""
     if record.input is None or record.input_kind != "reference" or record.input.unit != record.output.unit:
         return None
     found = _lead(record)
@@ -47,8 +48,8 @@ def early_output(record: Record) -> str | None:
 
 
 def _lead(record: Record) -> tuple[float, float, float] | None:
-    """By how much [s] the output comes before the reference, the standard error of that, and the period [s] of the slower channel; None
-    where that is not to be told."""
+    """Lead [s] of the output over the reference, its standard error [s], and the period [s] of the slower channel;
+    None where it cannot be determined."""
     reference, output = record.input, record.output
     assert reference is not None
     begin, end = max(reference.time[0], output.time[0]), min(reference.time[-1], output.time[-1])
@@ -78,7 +79,8 @@ def _error(leads: Array) -> float:
 
 
 def _lead_of(reference: Array, output: Array) -> float | None:
-    """Samples by which the output comes before the reference; None where one of them rests, or coming late explains the output as well."""
+    """Lead of the output over the reference in samples; None where one of them is constant, or where a lag explains
+    the output as well."""
     u, y = reference - reference.mean(), output - output.mean()
     if not u.any() or not y.any():
         return None
@@ -95,7 +97,7 @@ def _lead_of(reference: Array, output: Array) -> float | None:
 
 
 def _left(u: Array, y: Array, shift: int) -> float:
-    """Share of the output's power that the reference leaves, `shift` samples later."""
+    """Share of the output's power that the reference, `shift` samples earlier, does not explain."""
     first, second = (u[: len(u) - shift], y[shift:]) if shift >= 0 else (u[-shift:], y[:shift])
     power = float(second @ second)
     if power == 0.0 or not first.any():

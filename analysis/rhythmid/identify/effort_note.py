@@ -1,6 +1,7 @@
-"""What the balance of the recorded effort says of a model whose free run does not follow the machine.
+"""Effort balance of a model whose free run does not follow the machine.
 
-A free run adds up every small disturbance; the balance weighs effort and motion at each instant, so that it may serve where no free run does.
+A free run integrates every small disturbance. The balance compares effort and motion at each instant, so it can be
+useful where no free run is.
 """
 
 from collections.abc import Sequence
@@ -14,15 +15,15 @@ from rhythmid.report.quantity import rounded, with_written_unit
 
 
 def effort_note(records: Sequence[Record], model: Model, nrmse: float) -> str | None:
-    """The values by which the effort is balanced, and how well, in one line.
+    """The values that fit the effort balance, and its residual, in one line.
 
     Parameters
     ----------
-    records : as they drive the model.
-    model : the nominal one.
-    nrmse : share of the motion that the free run leaves.
+    records : prepared with the channel that drives the model.
+    model : the nominal model.
+    nrmse : share of the motion that the free run leaves unexplained.
 
-    None where the effort cannot be scored, or its balance leaves as large a share of it as the free run does of the motion.
+    Returns None where the effort cannot be scored, or where the balance leaves as large a share as the free run does.
     """
     way = applicable(records, model)
     if not way.applies:

@@ -21,13 +21,14 @@ from rhythmid.simulation.simulate import start_states
 from rhythmid.simulation.transport import command_delay, physical_times
 
 Array = NDArray[np.float64]
-DIVERGED = 1e100  # of any unit; squares of what is larger would overflow
+DIVERGED = 1e100  # in any unit; the square of a larger value would overflow
 NO_SIGNAL = pieces(None)
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """What the compiled loop takes: the `times` (n,) of its rows, knots and coefficients of command and forcing, and the parameter vector."""
+    """Arguments of the compiled loop: the `times` (n,) [s] of its rows, knots and coefficients of command and
+    forcing, and the parameter vector."""
 
     compiled: Compiled
     times: Array
@@ -38,10 +39,10 @@ class Prepared:
 
 @dataclass(frozen=True)
 class FreeRun:
-    """A structure and the series that it is run over.
+    """A model structure and the series that it is simulated over.
 
-    `stopping` is the structure whose steps end at the command's knots, `compiled` the one that is used while the delay is
-    constant: it takes the `smooth` surrogates of the commands where every one has one.
+    `stopping` is the structure whose integration steps end at the command's knots. `compiled` is used while the
+    delay is constant; where every command has a `smooth` surrogate, it takes those.
     """
 
     compiled: Compiled
@@ -57,7 +58,7 @@ class FreeRun:
 
     @property
     def longest_step(self) -> float:
-        """Step [s] beyond which blocks, or knots of the command, end every one."""
+        """Largest integration step [s]; every step also ends at a block or at a knot of the command."""
         return min(
             [*(one.period * one.block for one in self.series), *([] if self.smooth else _ticks(self.series))]
         )
@@ -65,10 +66,10 @@ class FreeRun:
     def rows(self, model: Model, index: int, start: Array, disturbance: PPoly | None = None) -> Array | None:
         """Rows (blocks, states + 2) of the compiled loop at the block centres of series `index`.
 
-        The start is the state at the first centre; what the record declares of the model's parameters replaces the model's own.
-        None when the simulation diverges. Raises ValueError for a start of another length than the state vector.
+        `start` is the state at the first centre. Parameters that the record declares replace the model's own. Returns
+        None when the simulation diverges. Raises ValueError when the length of `start` is not that of the state vector.
         """
-        if start.shape != (self.states,):  # the compiled loop would read beyond it
+        if start.shape != (self.states,):  # the compiled loop would read past its end
             raise ValueError(f"a start of shape {start.shape} for {self.states} states")
         given = self.prepared(model, index)
         out = np.empty((len(given.times), self.states + 2))
@@ -80,7 +81,7 @@ class FreeRun:
         return out if done == len(given.times) and float(np.abs(out[-1]).max()) < DIVERGED else None
 
     def prepared(self, model: Model, index: int) -> Prepared:
-        """What the compiled loop takes to run a model over series `index`."""
+        """Arguments of the compiled loop for a run of a model over series `index`."""
         one = self.series[index]
         given = one.inputs
         model = own_model(model, one)
@@ -96,7 +97,7 @@ class FreeRun:
         return Prepared(compiled, times, (knots, coefficients), given.forcing, compiled.layout.vector(model))
 
     def outputs(self, model: Model, starts: Sequence[Array]) -> list[Array] | None:
-        """Block-averaged outputs of all series from the given starts; None when one of them diverges."""
+        """Block-averaged outputs of all series from the given starts; None when one series diverges."""
         found: list[Array] = []
         for index, one in enumerate(self.series):
             rows = self.rows(model, index, starts[index])
@@ -106,14 +107,15 @@ class FreeRun:
         return found
 
     def many(self, cases: Sequence[tuple[Model, Sequence[Array]]], pool: ThreadPoolExecutor | None) -> list:
-        """Outputs of several (model, starts) cases; the compiled loop runs in parallel threads."""
+        """Outputs of several cases (model, starts), computed by the compiled loop in parallel threads."""
         if pool is None:
             return [self.outputs(*case) for case in cases]
         return list(pool.map(lambda case: self.outputs(*case), cases))
 
 
 def _sees_steps(model: Model) -> bool:
-    """Whether an element of the command's path takes a held command otherwise than its smooth surrogate: one with memory of extremes."""
+    """Whether an element of the command path responds differently to a held command and its smooth surrogate: one
+    that remembers extremes."""
     return any(term.element.memories for term in model.terms if term.element.slot in ("command", "actuator"))
 
 
@@ -128,7 +130,7 @@ def prepare_run(
 ) -> FreeRun:
     """Prepare the model's structure for the series. Raises InputError when series of different input kinds are mixed.
 
-    `max_step` [s] None means one Runge-Kutta step a block, or a value of a command at whose knots steps end, at most.
+    `max_step` [s] None means at most one Runge-Kutta step per block, or per command value where steps end at knots.
     """
     kinds: set[InputKind] = {one.kind for one in series if one.command is not None}
     if len(kinds) > 1:
@@ -157,9 +159,10 @@ def prepare_run(
 
 
 def _longest_step(model: Model, series: Sequence[Series], smooth: bool) -> float:
-    """One Runge-Kutta step [s] a block, or a value of a command at whose knots steps end.
+    """One Runge-Kutta step [s] per block, or per command value where steps end at the command's knots.
 
-    A sample at most where there is a controller: it may be as fast as that, and in steps beyond its stability no fit comes to its gains.
+    With a controller, at most one sample: the controller may be as fast as that. With steps beyond its limit of
+    stability no fit converges to its gains.
     """
     controlled = any(term.element.acts == "feedback" for term in model.terms)
     blocks = [one.period * (1 if controlled else one.block) for one in series]
@@ -167,8 +170,8 @@ def _longest_step(model: Model, series: Sequence[Series], smooth: bool) -> float
 
 
 def start_of(model: Model, run: FreeRun, index: int, position: float, velocity: float) -> Array:
-    """State of series `index` at its first block with this position and velocity; the elements' own as in the middle of
-    the motion, at the command and forcing that act there."""
+    """State of series `index` at its first block with this position and velocity. The elements' own states are
+    those in the middle of the motion, at the command and forcing that act there."""
     one = run.series[index]
     model = own_model(model, one)
     begin = physical_times(model, one.centres[:1])
@@ -178,12 +181,12 @@ def start_of(model: Model, run: FreeRun, index: int, position: float, velocity: 
 
 
 def _value(signal: PPoly | None, time: float) -> float:
-    """A signal [its unit] at a time [s]; zero before it begins."""
+    """Value of a signal at a time [s]; zero before its start."""
     return 0.0 if signal is None or time < signal.x[0] else float(signal(time))
 
 
 def with_series(run: FreeRun, index: int, series: Series) -> FreeRun:
-    """The run with one series exchanged, such as for one with another command; its steps end at the command's knots."""
+    """The run with one series exchanged, for example for another command. Steps end at the command's knots."""
     every = (*run.series[:index], series, *run.series[index + 1 :])
     return replace(run, compiled=run.stopping(), series=every, smooth=False)
 
@@ -191,7 +194,8 @@ def with_series(run: FreeRun, index: int, series: Series) -> FreeRun:
 def sufficient(
     run: FreeRun, model: Model, starts: Sequence[Array], tolerance: float, halvings: int = 8
 ) -> FreeRun:
-    """The run with its step halved until a further halving changes the outputs by less than `tolerance` (rms); at most so many `halvings`."""
+    """The run with its step halved until a further halving changes the outputs by less than `tolerance` (rms), at
+    most `halvings` times."""
     coarse = run.outputs(model, starts)
     for _ in range(halvings):
         finer = halved(run)
@@ -205,10 +209,10 @@ def sufficient(
 
 
 def coarser(run: FreeRun, factor: float) -> FreeRun:
-    """The run in steps that are longer by a factor, up to where blocks and knots of the command end them."""
+    """The run with steps longer by a factor. Blocks and the command's knots still end steps."""
     return replace(run, max_step=max(run.max_step, min(factor * run.max_step, run.longest_step)))
 
 
 def halved(run: FreeRun) -> FreeRun:
-    """The run in steps of half the size: where the forces are smooth the error of integration falls to a sixteenth."""
+    """The run with steps of half the size. Where the forces are smooth, the integration error falls to a sixteenth."""
     return replace(run, max_step=run.max_step / 2)

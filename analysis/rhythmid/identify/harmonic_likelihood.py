@@ -1,10 +1,11 @@
-"""Maximum likelihood in the frequency domain: harmonic transfer functions and limit cycle, parameters and delays together.
+"""Maximum likelihood in the frequency domain: parameters and delays together, from harmonic transfer functions and
+limit cycle.
 
 Minimises Σ_l |Y_l − Σ_m G_m(θ) e^{−j[(ω_l − mω_p) τ_u + ω_l τ_y]} U_{l−mP}|² / σ_l² + Σ_n |X̂_n − X_n(θ) e^{−jnω_p τ_y}|² / σ_n²
 over the free parameters θ and the delays (R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach,
 2nd ed., 2012, chapter 9; for time-periodic systems E. Louarroudi et al., IEEE TIM 61(5), 2012). The machine is linearised
 around its limit cycle, so distortion biases it slightly; the time-domain fit of `joint` has no such bias. This form
-finds its way from values that are far off, and is an independent check.
+converges from starting values that are far off. It is also an independent check.
 """
 
 import math
@@ -28,22 +29,20 @@ from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 DELAYS = (INPUT_DELAY, MEASUREMENT_DELAY)
-CYCLE = 4  # harmonics of the limit cycle that are used
-PARTS = 8  # into which the record is cut to see how much the limit cycle is disturbed
-LINES = 1500  # that a search looks at
-LONGEST_DELAY = 0.5  # [s] largest delay on either side that is looked for
-SIDEBANDS = 3  # on either side that are compared
-TIME = 0.02  # [s] size of a delay that begins at none
-UNEXPLAINED_NEAR_OPTIMUM = (
-    0.05  # unexplained share of the power from which a descent finds the rest of the way
-)
-FACTORS = np.geomspace(0.4, 2.5, 25)  # on each parameter when a search starts far off
+CYCLE = 4  # number of harmonics of the limit cycle that are used
+PARTS = 8  # parts of the record, whose spread gives the disturbance of the limit cycle
+LINES = 1500  # number of spectral lines used in a search
+LONGEST_DELAY = 0.5  # [s] largest delay searched on either side
+SIDEBANDS = 3  # number on either side that are compared
+TIME = 0.02  # [s] scale of a delay that starts at zero
+UNEXPLAINED_NEAR_OPTIMUM = 0.05  # unexplained share of the power below which a descent converges by itself
+FACTORS = np.geomspace(0.4, 2.5, 25)  # grid for each parameter when a search starts far from the optimum
 
 
 @dataclass(frozen=True, eq=False)
 class HarmonicFit:
-    """Parameters `names` (the delays last) with `values` and `covariance`; `misfit` is the unexplained share (rms) of
-    the response to the command, `expected` complex128[n] the response at the `bins`."""
+    """Parameters `names` (the delays last) with `values` and `covariance`. `misfit` is the unexplained share (rms)
+    of the response to the command, `expected` complex128[n] the predicted response at the `bins`."""
 
     model: Model
     names: tuple[str, ...]
@@ -60,7 +59,7 @@ class HarmonicFit:
 
 
 class _Comparison:
-    """A record's spectra beside those of a model."""
+    """Spectra of a record beside those of a model."""
 
     def __init__(self, record: Record, model: Model, pumping: Pumping, cycle: bool, ring_down: float) -> None:
         self.model, self.pumping = model, pumping
@@ -91,7 +90,7 @@ class _Comparison:
         return np.maximum(found, 1e-24)
 
     def thinned(self, lines: int) -> None:
-        """Look at no more than so many lines, those with most of the response."""
+        """Keep at most `lines` spectral lines, those with the largest response."""
         power = np.abs(self.spectra.output[self.bins]) ** 2
         strong = np.flatnonzero(power > 1e-4 * power.max())
         keep = np.sort(strong[:: max(1, -(-len(strong) // lines))])
@@ -99,7 +98,7 @@ class _Comparison:
 
     def linearised(self, values: Array) -> LinearisedModel:
         model = self.model.with_values(dict(zip(self.names, values)))
-        order = ORDER if self.pumping.active else 0  # nothing makes harmonics where nothing pumps
+        order = ORDER if self.pumping.active else 0  # without pumping there are no sidebands
         found = linearised(model, self.pumping, self._guess, order, self.kind)
         self._guess = found.cycle.states[0]
         return found
@@ -115,7 +114,7 @@ class _Comparison:
         return turned * np.exp(-1j * omega * (input_delay + measurement_delay))
 
     def residual(self, values: Array) -> Array:
-        """Deviations in standard deviations, real parts then imaginary parts."""
+        """Deviations divided by their standard deviations: real parts, then imaginary parts."""
         *own, input_delay, measurement_delay = values
         try:
             model = self.linearised(np.array(own))
@@ -136,10 +135,11 @@ class _Comparison:
         return np.concatenate(parts)
 
     def best_delays(self, model: LinearisedModel) -> tuple[float, float, float]:
-        """Unexplained share of the power, and the delays that leave least of it, from a grid.
+        """Smallest unexplained share of the power over a grid of delays, and the delays that give it.
 
-        The sum of the delays turns the response with ω, the input delay turns the sidebands: all pairs of a grid are
-        one matrix product. Where the limit cycle's phase is known, it says which measurement delays are possible.
+        The sum of the delays shifts the phase of the response with ω; the input delay shifts the phase of the
+        sidebands. All pairs of the grid are one matrix product. Where the limit cycle's phase is known, it limits
+        the measurement delay.
         """
         parts = self.sidebands(model)
         measured = self.spectra.output[self.bins]
@@ -166,7 +166,7 @@ class _Comparison:
         return float(left[i, j]), float(one[i]), float(max(later[i, j], 0.0))
 
     def reach(self, values: Array) -> tuple[float, Array]:
-        """Unexplained share at these parameters under the best delays, and the delays."""
+        """Unexplained share at these parameters under the best delays, and those delays."""
         try:
             model = self.linearised(values)
         except InputError:
@@ -180,7 +180,8 @@ class _Comparison:
 
 
 def _scan(comparison: _Comparison, start: Array) -> tuple[Array, Array, float]:
-    """Best of a multiplicative grid over the parameters, one after the other, twice around, with the best delays."""
+    """Best point of a multiplicative grid over the parameters, one after the other, in two passes, with the best
+    delays."""
     values = start.copy()
     best, delays = comparison.reach(values)
     for _ in range(2):
@@ -196,7 +197,7 @@ def _scan(comparison: _Comparison, start: Array) -> tuple[Array, Array, float]:
                 if left < best - 1e-9:
                     best, values, delays = left, trial, found
                 elif left == before:
-                    break  # this parameter does not show here
+                    break  # the data are not sensitive to this parameter
         if best > 0.98 * before:
             break
     return values, delays, best
@@ -231,10 +232,11 @@ def harmonic_likelihood(
     cycle: bool = True,
     search: bool = False,
 ) -> HarmonicFit:
-    """Estimate the model's free parameters and both delays from one record, wherever the model's values start.
+    """Estimate the model's free parameters and both delays from one record, also from starting values that are far off.
 
-    `model` has no forcing of its own: the `pumping` is. With `cycle` False the limit cycle is not used as data. With
-    `search` True only a start for another fit is wanted: few lines are looked at, once. Raises InputError when the record has no input or the model no limit cycle.
+    `model` has no forcing of its own: `pumping` describes it. With `cycle` False the limit cycle is not used as
+    data. With `search` True only a start for another fit is computed, from few spectral lines in one pass. Raises
+    InputError when the record has no input or the model no limit cycle.
     """
     if record.input is None:
         raise InputError(f"{record.name}: has no input, so there is no transfer function to fit")
@@ -243,7 +245,7 @@ def harmonic_likelihood(
     comparison = _Comparison(record, plain, pumping, cycle, ring_down)
     if search:
         comparison.thinned(LINES)
-    # while the search is far off, the cycle must not outweigh the response, nor its small harmonics count at all
+    # while the search is far off, the limit cycle must not outweigh the response; its small harmonics have no weight yet
     exact, response = comparison.cycle_variance, comparison.variance
     size = float(np.abs(comparison.spectra.cycle[1])) if len(comparison.spectra.cycle) > 1 else 1.0
     comparison.cycle_variance = np.full(CYCLE + 1, (0.03 * size) ** 2 + 1e-30)
@@ -273,7 +275,7 @@ def harmonic_likelihood(
 
 
 def _left(comparison: _Comparison, values: Array) -> Complex:
-    """Expected less measured response at the bins."""
+    """Predicted minus measured response at the bins."""
     parts = comparison.sidebands(comparison.linearised(values[:-2]))
     return comparison.expected(parts, values[-2], values[-1]) - comparison.spectra.output[comparison.bins]
 
@@ -301,7 +303,7 @@ def visible_sidebands(
     noise_density: float,
     harmonics: Sequence[int] = (1, 2, 3, 4),
 ) -> list[int]:
-    """Harmonics |m| that stand out of a noise of `noise_density` [unit²/Hz], two-sided: Σ|G_m U|²/σ² > 25."""
+    """Harmonics |m| that exceed noise of `noise_density` [unit²/Hz], two-sided: Σ|G_m U|²/σ² > 25."""
     found = spectra(record, pumping, 2.0, max(harmonics) + 1)
     bins = np.arange(1, len(found.output))
     m = np.array([sign * h for h in harmonics for sign in (-1, 1)])

@@ -1,7 +1,7 @@
-"""Held-out records: the identified model's free runs over records that no fit has seen.
+"""Held-out records: free runs of the identified model over records that were not used in the fit.
 
-Of such a record only what is its own is estimated: the state in which it begins, and the output's zero where the fit has found that
-this differs from record to record.
+Only two things are estimated from such a record: its initial state, and the output's zero where the fit found that
+the zero differs from record to record.
 """
 
 import math
@@ -35,9 +35,9 @@ class HeldOutRun:
     record
         The record as it is compared.
     fit
-        The run beside the record; None where the model cannot be run over it.
+        The free run beside the record; None where the model cannot be simulated over it.
     missing
-        Why not.
+        Reason for that.
     """
 
     record: Record
@@ -46,11 +46,11 @@ class HeldOutRun:
 
     @property
     def nrmse(self) -> float | None:
-        """rms(simulated − measured) / std(measured); None where the model cannot be run over the record."""
+        """rms(simulated − measured) / std(measured); None where the model cannot be simulated over the record."""
         return None if self.fit is None else self.fit.nrmse()
 
     def to_dict(self) -> dict[str, Any]:
-        """The error as plain data."""
+        """The error as plain JSON data."""
         return {"record": self.record.name, "nrmse": self.nrmse, "missing": self.missing}
 
 
@@ -63,7 +63,7 @@ class HeldOut:
     runs
         One for each held-out record.
     notes
-        What the user should know of these records, one line each.
+        Messages about these records for the user, one line each.
     """
 
     runs: tuple[HeldOutRun, ...]
@@ -71,7 +71,8 @@ class HeldOut:
 
     @property
     def nrmse(self) -> float | None:
-        """The error over all held-out records, each counting by the power of its motion; None where one of them has none."""
+        """The error over all held-out records, weighted by the power of their motion; None where one of them has no
+        error value."""
         fits = [one.fit for one in self.runs if one.fit is not None]
         if len(fits) < len(self.runs):
             return None
@@ -81,17 +82,17 @@ class HeldOut:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """`nrmse` over all records, and of each of the `records`."""
+        """`nrmse` over all records, and the error of each in `records`."""
         return {"nrmse": self.nrmse, "records": [one.to_dict() for one in self.runs]}
 
 
 def admitted_unseen(
     holdout: Sequence[Record], fitted: Sequence[Record], model: Model
 ) -> tuple[tuple[Record, ...], tuple[str, ...]]:
-    """The held-out records made tidy, those in which the machine stands still left out, and what there is to say of them.
+    """The held-out records after cleaning, without those in which the machine is at rest, and notes about them.
 
-    Raises InputError where it stands still in all of them, and for a record that declares what the model does not have, or that cannot
-    come from the machine of the `fitted` ones in the same units.
+    Raises InputError where the machine is at rest in all of them, for a record that declares a parameter that the
+    model does not have, and for a record that cannot come from the machine of the `fitted` ones in the same units.
     """
     if not holdout:
         return (), ()
@@ -113,11 +114,11 @@ def held_out_runs(
     Parameters
     ----------
     model
-        As it was identified.
+        The identified model.
     joint
-        The fit that it is from; None by the paper's method.
+        The fit that produced it; None for the paper's method.
     fitted, unseen
-        Records that the model was fitted to, and those that it was not.
+        Records used in the fit, and held-out records.
     """
     if joint is None:
         series = prepare(fitted)
@@ -141,7 +142,7 @@ def held_out_runs(
 
 
 def _series(record: Record, model: Model, joint: JointFit | None, block: int) -> list[Series]:
-    """A held-out record as the fitted ones were prepared, with a zero of its own where they have one."""
+    """A held-out record, prepared in the same way as the fitted ones, with a zero of its own where they have one."""
     series = begun_series(stretches_of((record,)), late_by(model), block)
     if joint is None:
         return series

@@ -1,7 +1,7 @@
-"""Held-out records whose output counts from another zero than that of the fit: noticed, told, and left as they are.
+"""Detects held-out records whose output is measured from another zero than in the fit. They are reported, not corrected.
 
-An encoder that was zeroed elsewhere makes a record of which a model that is right predicts nothing. Of such a record the zero is
-told where it alone takes away nearly all of an error that is large.
+Where an encoder was zeroed at another position, a correct model predicts such a record badly. The zero is reported
+where it alone explains nearly all of a large error.
 """
 
 import math
@@ -18,15 +18,16 @@ from rhythmid.identify.series import Series, record_of
 from rhythmid.identify.zero_estimates import zeros_of
 from rhythmid.model import Model
 
-MISFIT_OF_WRONG_ZERO = (
-    0.1  # of the motion, that a model leaves of a held-out record, from which its zero is asked for
-)
-AS_GOOD = 1.1  # times the least error, within which the smallest zero is told: those that are a turn apart do equally well
-TURNS = (0.5, -0.5, 1.0, -1.0)  # of a machine that turns: an encoder's zero may be a half or a whole one off
+# least unexplained share of the motion of a held-out record for which its zero is estimated
+MISFIT_OF_WRONG_ZERO = 0.1
+# ratio to the least error within which the smallest zero is reported: zeros one turn apart fit equally well
+AS_GOOD = 1.1
+TURNS = (0.5, -0.5, 1.0, -1.0)  # turns by which an encoder's zero may be off at a rotating joint
 
 
 def held_out_zero_notes(fit: Fit, unseen: Sequence[Series]) -> tuple[str, ...]:
-    """A sentence on each held-out record whose zero differs from that of the records of a fit; none where they do not tell it."""
+    """A sentence on each held-out record whose zero differs from that of the fitted records; none where zeros are
+    not identifiable."""
     if not unseen or unseen[0].measured != "position":
         return ()
     own = {record_of(one) for one in fit.run.series}
@@ -42,7 +43,7 @@ def held_out_zero_notes(fit: Fit, unseen: Sequence[Series]) -> tuple[str, ...]:
 
 
 def _zero_of(fit: Fit, parts: Sequence[Series], middle: float) -> float | None:
-    """The zero of a record, relative to that of the fit, where it explains nearly all of an error that is large; else None."""
+    """Zero of a record relative to that of the fit, where it explains nearly all of a large error; else None."""
     model, step = fit.model, fit.run.max_step
     error = _error(model, parts, fit.noise, step)
     size = math.sqrt(float(np.mean([np.var(one.value) for one in parts])))
@@ -63,7 +64,7 @@ def _zero_of(fit: Fit, parts: Sequence[Series], middle: float) -> float | None:
 def _error(
     model: Model, parts: Sequence[Series], noise: NoiseModel, step: float
 ) -> tuple[float, float] | None:
-    """The root mean square of what a model leaves of a record, and the record's zero; None where it cannot be simulated."""
+    """The rms residual of a record, and the record's zero; None where the record cannot be simulated."""
     try:
         fit = start_only(model, parts, noise, step)
         zeros = [value for value, _ in zeros_of(fit).values()]

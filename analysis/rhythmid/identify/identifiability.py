@@ -1,9 +1,9 @@
-"""What the records can tell and what they cannot: undetermined directions, the three observables of the delays, closure,
-aliases, and the honest answer about the two delays.
+"""Identifiability of parameters and delays: undetermined directions, three observables of the delays, closure and
+aliases.
 
-A shift (τ_u, τ_y, δ_f) → (+a, −a, +a) changes nothing that is recorded, with δ_f the offset of the forcing's phase
-against the record's clock. Three things can be observed: the limit cycle's phase A = τ_y + δ_f, the slope of the
-response's phase B = τ_u + τ_y, and the sidebands' offset C = τ_u − δ_f. In a right model A + C = B.
+Let δ_f be the offset of the forcing's phase against the record's clock. A shift (τ_u, τ_y, δ_f) → (+a, −a, +a)
+changes nothing in the record. Three quantities can be observed: the limit cycle's phase A = τ_y + δ_f, the slope of
+the response's phase B = τ_u + τ_y, and the sidebands' offset C = τ_u − δ_f. In a correct model A + C = B.
 """
 
 import math
@@ -33,12 +33,13 @@ from rhythmid.statistics import NORMAL_95
 Array = NDArray[np.float64]
 Forcing = Literal["on_robot", "delayed", "clock_unknown"]
 SEPARATE_BY = 4.0  # standard deviations
-SEEN = 1e-3  # of the limit cycle's fundamental, from which a harmonic of it counts
+SEEN = 1e-3  # share of the limit cycle's fundamental above which a harmonic is used
 
 
 @dataclass(frozen=True)
 class Offset:
-    """What is known of δ_f [s], the clock offset of the forcing's reference: bounds, or a Gaussian prior about `mean`."""
+    """Prior knowledge of δ_f [s], the clock offset of the forcing's reference: bounds, or a Gaussian prior about
+    `mean`."""
 
     low: float = -math.inf
     high: float = math.inf
@@ -47,7 +48,7 @@ class Offset:
 
 
 def offset_of(bounds: tuple[float, float] | None, std: float | None) -> Offset | None:
-    """The clock offset as stated: bounds (low, high) [s] or a standard deviation [s]; None where neither is.
+    """The stated clock offset: bounds (low, high) [s] or a standard deviation [s]; None where neither is given.
 
     Raises InputError for bounds out of order, or for both.
     """
@@ -65,7 +66,8 @@ def offset_of(bounds: tuple[float, float] | None, std: float | None) -> Offset |
 
 
 def _cycle_slope(joint: JointFit) -> Array | None:
-    """Whitened, projected change of the output when only the limit cycle comes later, (n,) [1/s]; None without cycle."""
+    """Whitened, projected sensitivity (n,) [1/s] of the output to a delay of the limit cycle alone; None without a
+    cycle."""
     fit = joint.fit
     problem = Problem(fit.run, fit.names, fit.noise, None)
     columns = []
@@ -90,11 +92,11 @@ def _cycle_slope(joint: JointFit) -> Array | None:
 
 
 def observables(joint: JointFit) -> Observables | None:
-    """A, B and C, each from its own part of the data, and the closure A + C − B in its standard deviations.
+    """A, B and C, each from its own part of the data, and the closure A + C − B divided by its standard deviation.
 
-    The limit cycle is given a delay of its own beside that of the response to the command; both are estimated, one
-    step from the joint optimum, together with everything else, with standard deviations that the scores of blocks bear
-    out. None where there is no cycle or a delay is not free.
+    The limit cycle gets a delay of its own beside that of the response to the command. Both are estimated together
+    with all other parameters, one step from the joint optimum. Their standard deviations are confirmed by the
+    scores of blocks. None where there is no cycle or where a delay is not free.
     """
     fit = joint.fit
     if joint.pumping is None or INPUT_DELAY not in fit.names or MEASUREMENT_DELAY not in fit.names:
@@ -127,7 +129,8 @@ def observables(joint: JointFit) -> Observables | None:
 
 
 def aliases(joint: JointFit, cycle: bool = True) -> tuple[tuple[float, float], ...]:
-    """Pairs (τ_u, τ_y), not negative, that give the very same record: shifts by T/gcd of all harmonics that show."""
+    """Nonnegative pairs (τ_u, τ_y) that give exactly the same record: shifts by T divided by the gcd of all visible
+    harmonics."""
     pumping, fit = joint.pumping, joint.fit
     if pumping is None:
         return ()
@@ -151,7 +154,7 @@ def aliases(joint: JointFit, cycle: bool = True) -> tuple[tuple[float, float], .
 
 
 def stated_by(joint: JointFit) -> Forcing | None:
-    """Where the forcing acts, as the recordings themselves say: a run that names its forcing made it on the robot."""
+    """Where the forcing acts, according to the recordings: a run that describes its forcing generated it on the robot."""
     runs_given = [record.run for record in joint.records]
     if runs_given and all(
         run is not None and dict(run.get("forcing") or {}).get("amplitude") for run in runs_given
@@ -166,12 +169,13 @@ def delays_of(
     offset: Offset | None = None,
     source: str = "the recorded forcing",
 ) -> Delays:
-    """The answer about the delays, no firmer than what the records and the user's statement support.
+    """Estimates of the delays, separate only where the records and the user's statement support it.
 
-    `forcing` states how the forcing reaches the machine: `on_robot` (made there, its recorded phase is the acting one),
-    `delayed` (through the same delayed channel as the command), `clock_unknown` (made on the robot, its phase recorded
-    by a clock whose `offset` is not known). Without a statement it is taken as on the robot, unless the fit then finds
-    an input delay of zero: that is just what a forcing through the delayed channel looks like, and the split is refused.
+    `forcing` states how the forcing reaches the machine: `on_robot` (generated there; the recorded phase is the
+    acting one), `delayed` (through the same delayed channel as the command), `clock_unknown` (generated on the
+    robot; its phase is recorded by a clock of unknown `offset`). The default is `on_robot`, unless the fit then
+    gives an input delay of zero. A forcing through the delayed channel looks exactly like that, so the delays are
+    then not reported separately.
     """
     directions = tuple(direction.words for direction in undetermined(joint.fit))
     return with_inner_delays(_of_paths(joint, forcing, offset, source, directions), joint.fit)
@@ -180,7 +184,7 @@ def delays_of(
 def _of_paths(
     joint: JointFit, forcing: Forcing | None, offset: Offset | None, source: str, directions: tuple[str, ...]
 ) -> Delays:
-    """The answer about the delays of the command and measurement paths; `directions` are undetermined, in words."""
+    """Delays of the command and measurement paths; `directions` are the undetermined directions, in words."""
     fit = joint.fit
     total = sum_of(fit, INPUT_DELAY, MEASUREMENT_DELAY)
     nothing = Estimate(None, None, "s")
@@ -243,7 +247,7 @@ def _of_paths(
 
 
 def _shifted(first: Estimate, second: Estimate, offset: Offset) -> tuple[Estimate, Estimate]:
-    """Delays under a Gaussian prior of the offset δ_f: τ_u = C + δ_f, τ_y = A − δ_f."""
+    """Delays under a Gaussian prior on the offset δ_f: τ_u = C + δ_f, τ_y = A − δ_f."""
     assert (
         first.value is not None
         and first.std is not None

@@ -1,6 +1,6 @@
-"""What is found in records: parameters, delays, HTFs, each with its uncertainty, and on which assumptions.
+"""Result of an identification: parameters, delays and HTFs, each with its uncertainty and its assumptions.
 
-`Identification.to_dict` is the contract of `rhythmid identify --json`.
+`Identification.to_dict` defines the JSON of `rhythmid identify --json`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rhythmid.identify.held_out import HeldOut
 
 Array = NDArray[np.float64]
-POINTS = 600  # of an HTF that are written out at most
+POINTS = 600  # largest number of frequencies of an HTF in the output
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class Estimate:
     Attributes
     ----------
     value
-        None where the records do not determine it.
+        None where it is not identifiable.
     std
         Standard deviation; None where it is not known.
     unit
-        Of both.
+        Unit of both.
 
     Examples
     --------
@@ -61,18 +61,18 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Observables:
-    """What the records show of the delays.
+    """Observables of the delays.
 
     Attributes
     ----------
     phase
-        Of the limit cycle, A = τ_y + δ_f [s].
+        Phase of the limit cycle, A = τ_y + δ_f [s].
     slope
-        Of the response's phase, B = τ_u + τ_y [s].
+        Slope of the response's phase, B = τ_u + τ_y [s].
     offset
-        Of the sidebands' phases, C = τ_u − δ_f [s].
+        Offset of the sidebands' phases, C = τ_u − δ_f [s].
     z
-        The closure A + C − B in its standard deviations.
+        Closure A + C − B divided by its standard deviation.
     """
 
     phase: Estimate
@@ -93,11 +93,11 @@ class InnerDelay:
     delay
         The dead time [s]; without a value where it is not `separable`.
     separable
-        Whether the records determine it alone.
+        Whether the dead time alone is identifiable.
     reason
-        Why not, where they do not.
+        Why not, where it is not.
     sums
-        With other delays, by their elements' labels, that are determined [s].
+        Identifiable sums with other delays [s], by their elements' labels.
     """
 
     delay: Estimate
@@ -120,20 +120,20 @@ class Delays:
     Attributes
     ----------
     input, measurement, sum
-        τ_u, τ_y and τ_u + τ_y [s]. The two have no value where they are not `separable`.
+        τ_u, τ_y and τ_u + τ_y [s]. Input and measurement delay have no value where they are not `separable`.
     separable
-        Whether the records separate the two.
+        Whether both delays are identifiable separately.
     assumption
-        What the split rests on.
+        Assumption on which the separation rests.
     closure
-        Limit-cycle phase + sideband offset − slope of G_0 in its standard deviations, which a right model keeps near zero; None
-        where one of the three is not identifiable.
+        Limit-cycle phase + sideband offset − slope of G_0, divided by its standard deviation. It is near zero for a
+        correct model. None where one of the three is not identifiable.
     aliases
-        Further pairs that fit as well.
+        Further pairs with the same fit.
     intervals
         95 % intervals of delays that are not separable [s].
     undetermined
-        In words, the changes of parameters that the records do not show.
+        Changes of parameters to which the records are insensitive, in words.
     inner
         Dead times inside the machine, by their elements' labels.
     """
@@ -170,8 +170,8 @@ class Delays:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What is shown of transfer functions: the `functions` Ĥ_m found in the first record without a model, whether the `paper`'s
-    method is, and for each what is missing where it is not."""
+    """Transfer functions to report: the `functions` Ĥ_m estimated without a model from the first record, whether
+    the `paper`'s method is reported, and for each of the two the missing conditions."""
 
     functions: HarmonicEstimates | None
     paper: bool
@@ -181,12 +181,12 @@ class Shown:
 
 @dataclass(frozen=True, eq=False)
 class Identification(Result):
-    """The answer to `rhythmid identify`.
+    """Result of `rhythmid identify`.
 
     Attributes
     ----------
     model
-        The model with all estimates in it, delays included.
+        The model with all estimates, delays included.
     parameters
         Estimates by "element.parameter".
     delays
@@ -194,17 +194,17 @@ class Identification(Result):
     shown
         Transfer functions, as far as their conditions hold.
     paper
-        The paper's method, record by record; empty where it finds nothing.
+        Results of the paper's method, record by record; empty where it gives none.
     quality
-        Rate [Hz], gaps, jitter_std [s], nrmse and what else tells how far to trust the rest.
+        Rate [Hz], gaps, jitter_std [s], nrmse and other measures of the quality of records and fit.
     joint
-        The joint fit; None where another method was asked for.
+        The joint fit; None where another method was requested.
     notes
-        What the user should know, one line each.
+        Messages for the user, one line each.
     cautions
-        What should keep a user from believing the estimates.
+        Reasons to doubt the estimates.
     held_out
-        The identified model's free runs over the held-out records; None without such records.
+        Free runs of the identified model over the held-out records; None without such records.
 
     Examples
     --------
@@ -233,12 +233,12 @@ class Identification(Result):
 
     @property
     def usable(self) -> bool:
-        """Whether the fit explains enough of the records to be called an identification."""
+        """Whether the fit explains enough of the records to count as an identification."""
         return not any(caution.name == "not_identified" for caution in self.cautions)
 
     @property
     def headline(self) -> str:
-        """How many parameters were found, and what of the motion they leave."""
+        """Number of estimated parameters, and the share of the motion that the model leaves unexplained."""
         found = sum(one.value is not None for one in self.parameters.values())
         left = percent(self.quality["nrmse"])
         if not self.usable:
@@ -257,7 +257,7 @@ class Identification(Result):
     def covariance(self) -> JointCovariance:
         """Covariance of the estimates, delays included; `covariance.correlation` is their correlation.
 
-        Raises InputError for the paper's method, which estimates magnitudes and phases apart.
+        Raises InputError for the paper's method, which estimates magnitudes and phases separately.
         """
         if self.joint is None:
             raise InputError("the paper's method has no joint covariance; identify with method='joint'")
@@ -279,7 +279,7 @@ class Identification(Result):
         }  # fmt: skip
 
     def show(self, console: "Console") -> None:
-        """Print estimates, delays and what casts doubt on them."""
+        """Print estimates, delays and cautions."""
         from rhythmid.identify.printed import show
 
         show(self.to_dict(), console)
@@ -292,7 +292,7 @@ class Identification(Result):
     def to_xarray(self) -> "xr.Dataset":
         """The transfer functions as an xarray Dataset over `harmonic` and `frequency`; see `HarmonicEstimates.to_xarray`.
 
-        Raises InputError, saying what is missing, where none were found.
+        Raises InputError, with the missing condition, where no transfer functions were estimated.
         """
         return self._functions().to_xarray(f"{self.model.units.position}/{self.model.units.force}")
 
@@ -302,14 +302,14 @@ class Identification(Result):
         Parameters
         ----------
         axis
-            Matplotlib axis; one of a new figure where None.
+            Matplotlib axis; None for a new figure.
         record
-            Which of the records.
+            Index of the record.
 
         Raises
         ------
         InputError
-            For the paper's method, which simulates nothing.
+            For the paper's method, which does not simulate.
         """
         if self.joint is None:
             raise InputError("the paper's method has no free run to draw; identify with method='joint'")
@@ -327,7 +327,7 @@ class Identification(Result):
     def plot_transfer_function(self, m: int = 0, axis: "Axes | None" = None) -> "Axes":
         """Draw the magnitude of harmonic m over frequency with its 95 % region.
 
-        Raises InputError where no transfer functions were found, or not this one.
+        Raises InputError where no transfer functions were estimated, or not this one.
         """
         one = self._functions().of(m)
         axis = axis_or_new(axis)
@@ -377,7 +377,7 @@ class Identification(Result):
 
 
 def _harmonic(one: HarmonicEstimate) -> dict[str, Any]:
-    """One transfer function as lists, thinned to what a figure needs."""
+    """One transfer function as lists, thinned to the resolution of a figure."""
     thin = slice(None, None, max(1, -(-len(one.value) // POINTS)))
     value = one.value[thin]
     return {

@@ -52,9 +52,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Method = Literal["joint", "paper"]
-UNKNOWN = 1e3  # times its size: a standard deviation beyond which a parameter is not determined at all
-CLOSED = 5.0  # standard deviations of the closure that call for a note
-FRACTION = 0.01  # of a sample period, below which a closure is numerical, whatever its standard deviation
+UNKNOWN = 1e3  # std relative to size above which a parameter is not identifiable
+CLOSED = 5.0  # standard deviations of the closure above which a note is given
+FRACTION = 0.01  # share of a sample period: a smaller closure is a numerical error, whatever its std
 SOURCES = {
     "forcing channel": "the recorded forcing",
     "stated formula": "the forcing stated by its formula",
@@ -63,16 +63,16 @@ SOURCES = {
 
 
 def paper_hopper() -> Model:
-    """The model that is used where none is given: the paper's hopper, equation (10)."""
+    """Default model: the paper's hopper, equation (10)."""
     text = (files("rhythmid") / "models" / "paper_hopper.yaml").read_text(encoding="utf-8")
     return Model.from_text(text, "paper_hopper.yaml")
 
 
 def forced_by(model: Model, record: Record) -> tuple[Model, Pumping]:
-    """The pumping of a record and the model without a forcing of its own.
+    """The pumping of a record, and the model without a forcing of its own.
 
-    The record's forcing wins over the model's `periodic_forcing`. Where neither is there the machine is taken as not
-    forced.
+    The record's forcing takes precedence over the model's `periodic_forcing`. Without either the machine is taken as
+    unforced.
     """
     own = [term for term in model.terms if term.element.name == "periodic_forcing"]
     for term in own:
@@ -86,7 +86,7 @@ def forced_by(model: Model, record: Record) -> tuple[Model, Pumping]:
 
 
 def with_delays(model: Model, input_delay: float, measurement_delay: float) -> Model:
-    """The model with these transport delays [s], whose elements are added where it lacks them."""
+    """The model with these transport delays [s]; missing delay elements are added."""
     for label, delay in (("input_delay", input_delay), ("measurement_delay", measurement_delay)):
         if model.term(label) is None:
             model = model.with_element(load_catalogue()[label], {"delay": delay})
@@ -113,33 +113,35 @@ def identify(
     records
         One or more recordings of the same machine.
     model
-        What is known of it; the paper's hopper where None.
+        Prior knowledge of the machine; None for the paper's hopper.
     harmonics
-        M, sidebands on either side that the paper's method estimates.
+        M, the number of sidebands on either side that the paper's method estimates.
     method
         `joint` maximum likelihood, or the `paper`'s two steps.
     forcing
         How the forcing reaches the machine; see `delays_of`.
     offset
-        What is known of the offset of the forcing's clock [s].
+        Prior knowledge of the offset of the forcing's clock [s].
     htf
-        How the harmonic transfer functions of the first record are found; see `harmonic_transfer_functions`. The
-        paper's method brings its own, equation (5), where this is `auto`.
+        Estimator of the harmonic transfer functions of the first record; see `harmonic_transfer_functions`. With
+        `auto` the paper's method uses its own, equation (5).
     tell
-        Called with a sentence at the beginning of each step.
+        Called with a sentence at the start of each step.
     holdout
-        Records to judge by only: no fit sees them, and the identified model is run over them.
+        Records for validation only: they are not used in the fit, and the identified model is simulated over them.
 
     Returns
     -------
     Identification
-        A fit that leaves more than a fifth of the motion is not `usable`. A machine of several joints gives a `MachineIdentification`.
+        A fit that leaves more than a fifth of the motion unexplained is not `usable`. A machine with several joints
+        gives a `MachineIdentification`.
 
     Raises
     ------
     InputError
-        When a record is fitted and held out, when most of an output is clipped, when a channel seems to be in another unit, to have its sign turned round or to be
-        exchanged with another, and by the paper's method when a record has no input, is shorter than a period, or the model has no limit cycle.
+        When a record is both fitted and held out, when most of an output is clipped, or when a channel seems to
+        have another unit or sign, or to be exchanged with another. By the paper's method also for a record without
+        input or shorter than a period, or without a limit cycle.
 
     Examples
     --------
@@ -170,7 +172,8 @@ def identify(
     if not given:
         raise InputError("nothing to identify from: give at least one record")
     if model is not None and not isinstance(model, Model):
-        from rhythmid.identify.joints.joint_identification import identify_machine  # it needs MuJoCo
+        # imported here because it needs MuJoCo
+        from rhythmid.identify.joints.joint_identification import identify_machine
 
         if (method, forcing, offset, htf) != ("joint", None, None, "auto"):
             raise InputError("method, forcing, offset and htf are for a machine of one axis; leave them out")
@@ -230,7 +233,8 @@ def _identified(
 
 @dataclass(frozen=True)
 class _Seen:
-    """Records with the nominal model, their pumping, and what the paper's method finds in them or why it finds nothing."""
+    """Records with the nominal model, their pumping, and the results of the paper's method or the reason why it
+    gives none."""
 
     records: tuple[Record, ...]
     nominal: Model
@@ -239,7 +243,7 @@ class _Seen:
 
     @property
     def paper(self) -> tuple[PaperResult, ...]:
-        """What was found, record by record; nothing where one record gives nothing."""
+        """Results record by record; empty where one record gives none."""
         found = tuple(one for one in self.results if not isinstance(one, str))
         return found if len(found) == len(self.results) else ()
 
@@ -248,7 +252,7 @@ class _Seen:
         return self.pumpings[0].source
 
     def shown(self, method: Method, htf: HtfMethod) -> "Shown":
-        """What is shown of transfer functions; all of it where it was asked for by name."""
+        """Transfer functions to report; all of them where they were requested by name."""
         pumping, result = self.pumpings[0], self.results[0]
         missing = lacks_transfer_functions(pumping, result) if method == "joint" and htf == "auto" else None
         lacks = lacks_paper_method(pumping, result) if method == "joint" else None
@@ -261,7 +265,7 @@ class _Seen:
             and htf == "auto"
             and lacks
         ):
-            functions, missing = None, lacks  # equation (5) of the paper has the same needs
+            functions, missing = None, lacks  # equation (5) of the paper has the same conditions
         return Shown(functions, lacks is None, missing, lacks)
 
     def judged(
@@ -272,7 +276,7 @@ class _Seen:
         joint: JointFit | None,
         nrmse: float,
     ) -> tuple[Caution, ...]:
-        """What should keep a user from believing the estimates. Raises InputError where a channel is in another unit."""
+        """Reasons to doubt the estimates. Raises InputError where a channel is in another unit."""
         stuck = joint is not None and not joint.search.arrived
         cautions = large_shifts(self.nominal, parameters, delays, self.records)
         if not stuck and nrmse <= POOR_MOTION and shift(self.nominal, fitted) <= SHIFTED:
@@ -286,7 +290,7 @@ class _Seen:
 
 
 def _by_paper(seen: _Seen, htf: HtfMethod, method: Method) -> Identification:
-    """Parameters and delays by the paper's method, each record's weighed by its variance."""
+    """Parameters and delays by the paper's method: average over records, weighted by inverse variance."""
     records, results = seen.records, seen.paper
     first = results[0]
     units = first.fit.model.parameters
@@ -299,7 +303,7 @@ def _by_paper(seen: _Seen, htf: HtfMethod, method: Method) -> Identification:
     if delays.separable:
         assert delays.input.value is not None and delays.measurement.value is not None
         fitted = with_delays(fitted, delays.input.value, delays.measurement.value)
-    else:  # what a simulation needs is the sum, wherever it stands
+    else:  # a simulation needs only the sum, in either place
         fitted = with_delays(fitted, delays.sum.value or 0.0, 0.0)
     nrmse = cycle_nrmse(fitted, records, results)
     cautions = seen.judged(fitted, parameters, delays, None, nrmse)
@@ -315,7 +319,7 @@ def _by_likelihood(
 ) -> Identification | None:
     """Parameters and delays by joint maximum likelihood; HTFs without a model.
 
-    None where a cycle whose forcing is unknown cannot be simulated, but transfer functions around it can still be fitted.
+    None where a cycle of unknown forcing cannot be simulated, but transfer functions around it can still be fitted.
     """
     records, paper = seen.records, seen.paper
     unforced = paper and not any(pumping.active for pumping in seen.pumpings)
@@ -380,7 +384,7 @@ def _by_likelihood(
 
 
 def _open(delays: Delays, period: float) -> bool:
-    """Whether limit cycle and response to the command disagree about the delays; `period` [s] between samples."""
+    """Whether limit cycle and response to the command give different delays; `period` is the sample period [s]."""
     seen = delays.observables
     if seen is None or delays.closure is None or abs(delays.closure) <= CLOSED:
         return False
@@ -389,7 +393,7 @@ def _open(delays: Delays, period: float) -> bool:
 
 
 def _harmonics(result: PaperResult, method: HtfMethod) -> HarmonicEstimates:
-    """Transfer functions of a record, whose spectra the paper's method has at hand."""
+    """Transfer functions of a record, from the spectra that the paper's method has already computed."""
     if method == "regularised_least_squares":
         return smoothed(result.estimate)
     return harmonic_transfer_functions(result.spectra, result.fit.linearised.cycle.ring_down, method)

@@ -1,8 +1,8 @@
-"""Directions in parameter space that the outputs hardly notice, differenced along themselves.
+"""Ill-conditioned directions in parameter space, with sensitivities differenced along these directions.
 
-Parameters that act alike (gravity and rest length) cancel one another in the sum of their columns, and what is left of
-sensitivities by one-sided differences is the error of the differences. Moved together, with a central difference, they
-cancel in the simulation itself: what is left then is what the records would notice.
+Parameters with similar effects (gravity and rest length) cancel in the sum of their columns. What remains of
+one-sided differences is then their error. If the parameters are moved together, with a central difference, they
+cancel in the simulation itself. What remains then is the true sensitivity of the outputs.
 """
 
 from collections.abc import Sequence
@@ -15,12 +15,13 @@ from rhythmid.identify.sensitivity import Linearisation, Problem
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-ILL_CONDITIONED = 1e-3  # singular value of the scaled sensitivities, relative to the largest, from which a direction is looked at
+# singular value of the scaled sensitivities, relative to the largest, below which a direction is treated
+ILL_CONDITIONED = 1e-3
 
 
 def ill_conditioned(jacobian: Array) -> list[Array]:
-    """Directions (p,), as changes of the parameters that would move the outputs by one if they did not cancel; empty where
-    the sensitivities (n, p) are well conditioned."""
+    """Directions (p,): changes of the parameters that would change the outputs by one if they did not cancel. Empty
+    where the sensitivities (n, p) are well conditioned."""
     norms = np.linalg.norm(jacobian, axis=0)
     live = norms > 0.0
     if live.sum() < 2:
@@ -38,7 +39,8 @@ def ill_conditioned(jacobian: Array) -> list[Array]:
 def with_ill_conditioned_directions(
     linearisation: Linearisation, problem: Problem, model: Model, starts: Sequence[Array]
 ) -> Linearisation:
-    """The linearisation with its sensitivities along ill-conditioned directions replaced by differences along these directions."""
+    """The linearisation with its sensitivities along ill-conditioned directions replaced by central differences
+    along them."""
     jacobian = linearisation.jacobian
     norms = np.linalg.norm(jacobian, axis=0)
     size = (
@@ -47,7 +49,8 @@ def with_ill_conditioned_directions(
     for change in ill_conditioned(jacobian):
         slope = _slope(linearisation, problem, model, starts, change, size)
         if slope is not None:
-            dual = change * norms**2  # its product with `change` is one, with the other directions zero
+            # dual vector: its product with `change` is one, with the other directions zero
+            dual = change * norms**2
             jacobian = jacobian + np.outer(slope - jacobian @ change, dual)
     return replace(linearisation, jacobian=jacobian)
 

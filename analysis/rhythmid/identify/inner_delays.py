@@ -1,9 +1,9 @@
-"""Dead times inside the machine: which of them the records tell, and which sums of delays where they do not.
+"""Dead times inside the machine: which are identifiable, and otherwise which sums of delays are.
 
-Without a controller all that drives the machine comes later by a dead time of its actuator, and so does the motion: nothing
-recorded tells it from a measurement delay. Inside a controller's loop it moves the loop's own poles, which shows; then forcing,
-reference and loop show three sums of the four delays τ_u, τ_a, τ_f and τ_y. What is not determined is told by the sensitivities,
-whatever the machine.
+Without a controller, a dead time of the actuator delays every force that drives the machine, and so the motion.
+Nothing in the record distinguishes it from a measurement delay. Inside a controller's loop a dead time moves the
+poles of the loop, which is observable. Forcing, reference and loop then show three sums of the four delays τ_u,
+τ_a, τ_f and τ_y. The sensitivities show what is not identifiable, for any machine.
 """
 
 from collections.abc import Sequence
@@ -19,19 +19,19 @@ from rhythmid.identify.undetermined import sum_beside, sum_of
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-OPPOSITE = 0.05  # of a direction's largest step, within which steps cancel
-# of the delays' largest sensitivity, below which what is left of a direction is an error of integration and of differences
+OPPOSITE = 0.05  # share of a direction's largest step within which steps count as cancelling
+# share of the delays' largest sensitivity below which the rest of a direction is an error of integration and differences
 UNNOTICED = 5e-3
 UNKNOWN = Estimate(None, None, "s")
 
 
 def dead_times(model: Model) -> dict[str, str]:
-    """Parameters that are dead times inside the machine, with the labels of their elements."""
+    """Parameters that are dead times inside the machine, with their elements' labels."""
     return {f"{t.label}.{t.element.dead_time}": t.label for t in model.terms if t.element.history}
 
 
 def with_inner_delays(found: Delays, fit: Fit) -> Delays:
-    """The answer about the delays with those inside the machine; without a value what only a sum is known of."""
+    """The delays with dead times inside the machine added; a delay has no value where only a sum is identifiable."""
     inside = {name: label for name, label in dead_times(fit.model).items() if name in fit.names}
     if not inside:
         return found
@@ -61,7 +61,8 @@ def with_inner_delays(found: Delays, fit: Fit) -> Delays:
 
 
 def unnoticed(fit: Fit, among: Sequence[str]) -> Array:
-    """Directions (d, n) in the space of these delays, largest step 1, that change nothing that other parameters do not make up for."""
+    """Directions (d, n) in the space of these delays, with largest step 1, whose effect other parameters can absorb
+    completely."""
     places = np.array([name in among for name in fit.names])
     order = [fit.names.index(name) for name in among]
     columns, others = fit.linearisation.jacobian[:, order], fit.linearisation.jacobian[:, ~places]
@@ -73,7 +74,7 @@ def unnoticed(fit: Fit, among: Sequence[str]) -> Array:
 
 
 def _refused(fit: Fit, name: str, among: Sequence[str], directions: Array) -> InnerDelay:
-    """A dead time without a value, with the sums that are the same however far one goes in an undetermined direction."""
+    """A dead time without a value, with the sums that stay constant along the undetermined directions."""
     place = among.index(name)
     groups = [(place, at) for at in range(len(among)) if at != place]
     same = [one for one in groups if _cancels(directions[:, one])] or [
@@ -95,5 +96,5 @@ def _refused(fit: Fit, name: str, among: Sequence[str], directions: Array) -> In
 
 
 def _cancels(steps: Array) -> bool:
-    """Whether the steps (d, n) of each direction add up to nothing."""
+    """Whether the steps (d, n) of each direction sum to zero."""
     return bool(np.all(np.abs(steps.sum(axis=1)) <= OPPOSITE))

@@ -1,5 +1,5 @@
-"""What drives a series, as the compiled loop takes it: made when it is asked for, and shared by all series with the same
-signals: of long records they are most of what has to be held in memory."""
+"""Driving signals of a series in the form of the compiled loop. They are made on demand and shared by all series
+with the same signals, because those of long records take most of the memory."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,9 +13,9 @@ from rhythmid.simulation.signal import FAR, impulse_preserving, is_held, pieces
 
 Array = NDArray[np.float64]
 Pieces = tuple[Array, Array]
-SMOOTHED_FROM = 16  # knots of a command that has a smooth surrogate, more than these
-# knots of a command from which its pieces are made anew for each run. Measured at 300 000 of them: 1 % of the run's time for a held command
-# and 4 % for a cubic one, whose pieces would hold 5 and 12 MB
+SMOOTHED_FROM = 16  # number of knots above which a command gets a smooth surrogate
+# number of a command's knots above which its pieces are rebuilt for each run. Measured at 300 000 knots: 1 % of the
+# run's time for a held command and 4 % for a cubic one, whose pieces would take 5 and 12 MB
 LONG = 100_000
 
 
@@ -28,7 +28,7 @@ class Inputs:
 
     @property
     def stamps(self) -> Array:
-        """Knots (k,) of the command [s], before any delay; empty without one."""
+        """Knots (k,) of the command [s], before any delay; empty without a command."""
         if self.commanded is None:
             return np.empty(0)
         knots = self.commanded.x
@@ -36,7 +36,7 @@ class Inputs:
 
     @property
     def command(self) -> Pieces:
-        """The command, before any delay; that of a long record is not kept."""
+        """The command, before any delay; not cached for a long record."""
         if self.commanded is None or len(self.commanded.x) < LONG:
             return self._short_command
         return pieces(self.commanded)
@@ -52,7 +52,7 @@ class Inputs:
 
     @cached_property
     def even_tick(self) -> float:
-        """Usual time [s] between the knots of a held command; infinite where there is none, or where its times are uneven."""
+        """Usual time [s] between the knots of a held command; infinite without one, or where its times are uneven."""
         command = self.commanded
         if command is None or not is_held(command) or len(command.x) <= SMOOTHED_FROM:
             return np.inf
@@ -62,6 +62,6 @@ class Inputs:
 
     @cached_property
     def smooth(self) -> Pieces:
-        """Smooth surrogate for the command, which is held at an even tick."""
+        """Smooth surrogate of a command that is held at even intervals."""
         assert self.commanded is not None
         return pieces(impulse_preserving(self.commanded))

@@ -1,9 +1,9 @@
-"""Joint maximum likelihood: parameters and both delays at once, from the nonlinear model, with the limit cycle as data.
+"""Joint maximum likelihood: parameters and both delays together, from the nonlinear model, with the limit cycle as data.
 
-The fit itself is output error in the time domain on the full simulator: whitened, so efficient for Gaussian noise, and
-without the distortion that biases a linearised machine. What this file adds is a start that does not depend on the
-model's values (the harmonic likelihood, which sees delays as phases and tries them all), the choice of what counts as
-data, and the judgement whether the search arrived.
+The fit is output error in the time domain on the full simulator. The residuals are whitened, so it is efficient for
+Gaussian noise, and it is free of the distortion that biases a linearised machine. This file adds three things: a
+start that does not depend on the model's values (the harmonic likelihood, which treats delays as phases and tries
+them all), the choice of the data to use, and the test whether the search converged to the right optimum.
 """
 
 from collections.abc import Sequence
@@ -31,24 +31,25 @@ from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-STUCK = 0.5  # unexplained share (rms) of the response to the command, beyond which a fit is no answer
-POOR_MOTION = 0.2  # the same of the whole motion: what leaves more than a fifth of it is not identified
-CYCLE_HARMONICS = 24  # that are projected out where the limit cycle is not to be used
+STUCK = 0.5  # unexplained share (rms) of the response to the command above which a fit is rejected
+# unexplained share (rms) of the whole motion above which the model counts as not identified
+POOR_MOTION = 0.2
+CYCLE_HARMONICS = 24  # number that is projected out where the limit cycle is not used
 STEP, FINE_STEP = (
     0.2,
     0.05,
-)  # of a block, integrated in one step; the latter where the limit cycle is not to be used
-# share to which a delay of a period of the motion more has to lower the error: a motion that repeats itself looks the same a period later, but for
-# where it begins
+)  # integration step as a share of a block; the second where the limit cycle is not used
+# required ratio of errors for a delay one period of the motion longer: a periodic motion looks the same a period
+# later, except at its start
 LATER_PERIOD = 0.7
-EARLIEST = 1.5  # samples by which a delay may come out negative
+EARLIEST = 1.5  # samples by which an estimated delay may be negative
 NO_PUMPING = Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none")
 
 
 @dataclass(frozen=True)
 class Search:
-    """How well a fit explains its records: unexplained shares (rms) of the whole motion and of the response to the
-    command, and residual over noise floor. `arrived` is False where the search is stuck or the model does not fit."""
+    """Quality of a fit: unexplained shares (rms) of the whole motion and of the response to the command, and the
+    ratio of residual to noise floor. `arrived` is False where the search is stuck or the model does not fit."""
 
     motion: float
     response: float
@@ -67,9 +68,9 @@ class Search:
 
 @dataclass(frozen=True)
 class JointFit:
-    """The answer: the time-domain `fit` to the `records`, its `pumping` (None without forcing), and how the `search` for it
-    ended. `smear` [s] is the time over which the commands of the fit's series are averaged, for a drive that takes them at a slower rate;
-    0 where they act as recorded."""
+    """Result of the joint fit: the time-domain `fit` to the `records`, its `pumping` (None without forcing), and
+    the state of the `search`. `smear` [s] is the time over which the commands are averaged for a drive that takes
+    them at a slower rate; 0 where they act as recorded."""
 
     fit: Fit
     pumping: Pumping | None
@@ -83,11 +84,12 @@ class JointFit:
 
 
 def prepared_model(model: Model, records: Sequence[Record]) -> tuple[Model, Pumping | None]:
-    """The model with both delays, without a forcing that the records already hold; and the pumping of the first.
+    """The model with both delays and without a forcing that the records already contain; and the pumping of the
+    first record.
 
-    Both delays may come out negative by a sample and a half: noise scatters about zero, and an input that is not held
-    but simulated as held acts half a sample early. Neither exceeds the longest record: beyond it no command acts, and the
-    response is the same for all delays.
+    Both delays may come out negative by a sample and a half: noise scatters about zero, and an input that is
+    simulated as held but is not held acts half a sample early. Neither exceeds the longest record: with a longer
+    delay no command acts, and the response does not depend on the delay.
     """
     catalogue = load_catalogue()
     own = [term for term in model.terms if term.element.name == "periodic_forcing"]
@@ -128,7 +130,7 @@ def without_forcing(model: Model) -> Model:
 
 
 def _begun(record: Record, delay: float) -> Record:
-    """The record from where the past of command and forcing, `delay` [s] ago, is known."""
+    """The record from the time at which command and forcing are known `delay` [s] back."""
     known = [c.time[0] for c in (record.input, record.forcing) if c is not None and len(c) > 0]
     first = int(np.searchsorted(record.output.time, max(known, default=-np.inf) + delay))
     if first == 0 or first > len(record.output) // 2:
@@ -138,7 +140,7 @@ def _begun(record: Record, delay: float) -> Record:
 
 
 def cycle_columns(series: Series, pumping: Pumping) -> Array:
-    """Mean and harmonics of the limit cycle at the blocks' centres."""
+    """Mean and harmonics of the limit cycle at the blocks' centres, as columns."""
     highest = int(0.5 / (series.period * series.block * pumping.frequency)) - 1
     n = np.arange(1, max(1, min(CYCLE_HARMONICS, highest)) + 1)
     angle = np.multiply.outer(pumping.omega * series.centres, n)
@@ -146,7 +148,7 @@ def cycle_columns(series: Series, pumping: Pumping) -> Array:
 
 
 def explained(fit: Fit, pumping: Pumping | None) -> Search:
-    """Compare what the fit leaves with the motion, with the response to the command and with the noise."""
+    """Compare the residuals of the fit with the motion, with the response to the command and with the noise."""
     left = response = floor = count = 0.0
     for one, residual in zip(fit.run.series, fit.residuals):
         used = one.used
@@ -166,12 +168,12 @@ def explained(fit: Fit, pumping: Pumping | None) -> Search:
     least = max(floor, 1e-18 * response, 1e-300)
     unexplained = float(np.sqrt(left / max(explained, 0.01 * response)))
     if pumping is not None and not any(one.commanded for one in fit.run.series):
-        unexplained = 0.0  # there is no response to a command, only the cycle
+        unexplained = 0.0  # no response to a command, only the limit cycle
     return Search(motion, unexplained, float(np.sqrt(left / least)))
 
 
 def _start(model: Model, records: Sequence[Record], pumping: Pumping | None) -> list[Model]:
-    """Models with values from the harmonic likelihood of each record, best first; empty where it has nothing to see."""
+    """Models with values from the harmonic likelihood of each record, best first; empty where it cannot be applied."""
     found: list[tuple[float, Model]] = []
     plain = without_forcing(model)
     for record in sorted(records, key=lambda r: -r.duration)[:3]:
@@ -196,7 +198,8 @@ def _start(model: Model, records: Sequence[Record], pumping: Pumping | None) -> 
 
 
 def _search_in_time(model: Model, series: Sequence[Series]) -> Fit:
-    """Fit without a start from the harmonics: short windows with starts of their own first, then delays far apart."""
+    """Fit without a start from the harmonics: first short windows with initial states of their own, then delays far
+    apart."""
     length = 2.0 / max(dominant_frequency(one) for one in series)
     windows = [part for one in series for part in split(one, length)]
     best: Fit | None = None
@@ -237,10 +240,10 @@ def _sum_of_squares(fit: Fit) -> float:
 
 
 def joint_likelihood(records: Record | Sequence[Record], model: Model) -> JointFit:
-    """The estimate that `best_fit` finds.
+    """The estimate of `best_fit`, if the search converged.
 
-    Arguments as there. Raises InputError when the records have nothing to fit, and when the search did not arrive: a fit that is
-    stuck is never returned.
+    Arguments as there. Raises InputError when the records have nothing to fit, and when the search did not
+    converge: a fit from a stuck search is never returned.
     """
     found = best_fit(records, model)
     if found.search.arrived:
@@ -252,28 +255,29 @@ def joint_likelihood(records: Record | Sequence[Record], model: Model) -> JointF
 
 
 def best_fit(records: Record | Sequence[Record], model: Model) -> JointFit:
-    """Estimate all free parameters of the model and its delays from all records at once.
+    """Estimate all free parameters of the model and its delays from all records together.
 
     Parameters
     ----------
     records : recordings of the same machine.
-    model : what is known of it; its values may be far off.
+    model : prior knowledge of the machine; its values may be far off.
 
-    The best that was found, whose `search` tells whether it arrived. Of delays that are whole periods of the motion apart it has the shortest
-    that fits about as well. Raises InputError when the records have nothing to fit.
+    Returns the best fit; its `search` says whether it converged. Among delays that are whole periods of the motion
+    apart, the shortest that fit about as well are chosen. Raises InputError when the records have nothing to fit.
     """
     return of_shortest_delays(_best_fit(records, model))
 
 
 def of_shortest_delays(found: JointFit) -> JointFit:
-    """Of fits whose delays are whole periods of the motion apart that with the shortest ones that fits about as well."""
+    """Among fits whose delays are whole periods of the motion apart, the one with the shortest delays that fits
+    about as well."""
     while (shorter := _a_period_earlier(found)) is not None:
         found = shorter
     return found
 
 
 def _a_period_earlier(found: JointFit) -> JointFit | None:
-    """The fit from delays that together are a period of the motion shorter, where it is about as good; None else."""
+    """A fit whose total delay is one period of the motion shorter, where it is about as good; else None."""
     free = [name for name in DELAYS if name in found.fit.names]
     period = 1.0 / dominant_frequency(max(found.fit.run.series, key=lambda one: one.blocks), finer=8)
     model, rest = found.fit.model, period
@@ -287,7 +291,7 @@ def _a_period_earlier(found: JointFit) -> JointFit | None:
         fit = estimate(model, series, max_step=step_of(series))
     except InputError:
         return None
-    # a descent that comes back to where it began tells nothing
+    # a descent that returns to its start gives no information
     shorter = sum(fit.model.value(name) for name in free) < sum(found.fit.model.value(n) for n in free)
     return (
         _judged(fit, found.pumping, found.records)
@@ -327,7 +331,7 @@ def _best_fit(records: Record | Sequence[Record], model: Model) -> JointFit:
 
 
 def fit_from(model: Model, records: Record | Sequence[Record], cycle: bool = True) -> Fit:
-    """The fit that the model's own values lead to, without a search: for values that are known to be near.
+    """The fit reached from the model's own values without a search, for values that are known to be close.
 
     With `cycle` the limit cycle is used as data; without it only the response to the command is.
     """
@@ -341,18 +345,19 @@ def fit_from(model: Model, records: Record | Sequence[Record], cycle: bool = Tru
 
 
 def step_of(series: Sequence[Series]) -> float:
-    """Integration step [s]: small enough that its error moves no estimate by more than a tenth of its standard deviation at
-    a noise of a thousandth of the motion.
+    """Integration step [s]. Its error changes no estimate by more than a tenth of its standard deviation, for noise
+    of a thousandth of the motion.
 
-    Without the limit cycle only sidebands, a thousandth of the motion, tell the two delays apart; that asks for finer steps.
+    Without the limit cycle, only the sidebands separate the two delays. They are a thousandth of the motion, which
+    needs finer steps.
     """
     share = FINE_STEP if any(one.ignored is not None for one in series) else STEP
     return share * min(one.period * one.block for one in series)
 
 
 def stretches_of(records: Sequence[Record]) -> tuple[Record, ...]:
-    """The records, cut where commands are missing. Stretches whose forcing does not tell its phase, being too short or full
-    of gaps, are left out where another one does."""
+    """The records, cut where commands are missing. Stretches whose forcing phase cannot be determined, being too
+    short or full of gaps, are left out where another stretch has it."""
     found: list[Record] = []
     for record in records:
         stretches = cut_at_gaps(record).stretches
@@ -365,12 +370,12 @@ def stretches_of(records: Sequence[Record]) -> tuple[Record, ...]:
 
 
 def late_by(model: Model) -> float:
-    """How far back [s] the command of a measurement lies, by a model's delays."""
+    """Time [s] between a command and the measurement of its effect, by a model's delays."""
     return sum(max(model.value(name), 0.0) for name in DELAYS if name in model.parameters)
 
 
 def begun_series(records: Sequence[Record], delay: float, block: int | None = None) -> list[Series]:
-    """Series of the records from where what acted `delay` [s] ago is known; `block` as for `prepare`."""
+    """Series of the records from the time at which signals are known `delay` [s] back; `block` as for `prepare`."""
     return prepare([_begun(record, delay + 0.05 if delay > 0.0 else 0.0) for record in records], block)
 
 

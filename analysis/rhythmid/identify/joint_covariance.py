@@ -1,4 +1,4 @@
-"""How the errors of several estimates go together."""
+"""Joint covariance of estimates, and their correlation."""
 
 import math
 from collections.abc import Sequence
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
-DARK = 0.6  # correlation from which a cell of the drawing is dark
-MOST_WRITTEN = 12  # parameters up to which a drawing has room for numbers
-UNDETERMINED = 1e20  # variance from which the records say nothing of a parameter
+DARK = 0.6  # correlation above which a cell of the plot is dark
+MOST_WRITTEN = 12  # largest number of parameters for which the plot shows numbers
+UNDETERMINED = 1e20  # variance from which a parameter counts as not identifiable
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,10 +26,10 @@ class JointCovariance:
 
     Attributes
     ----------
-    names : parameters, p of them, delays included.
-    units : of each.
-    matrix : float64[p, p] covariance in the products of their units; rows and columns of a parameter that the records do not
-        determine hold infinity on the diagonal and NaN elsewhere.
+    names : names of the p parameters, delays included.
+    units : unit of each.
+    matrix : float64[p, p] covariance in the products of their units. A parameter that is not identifiable has
+        infinity on the diagonal, and NaN in the rest of its row and column.
 
     Examples
     --------
@@ -45,7 +45,7 @@ class JointCovariance:
 
     @classmethod
     def of(cls, names: Sequence[str], units: Sequence[str], matrix: Array) -> "JointCovariance":
-        """The covariance with its undetermined parameters marked."""
+        """The covariance with parameters that are not identifiable marked."""
         unknown = ~(np.abs(np.diag(matrix)) < UNDETERMINED)
         marked = np.where(unknown[:, None] | unknown[None, :], math.nan, matrix)
         marked[unknown, unknown] = math.inf
@@ -58,7 +58,8 @@ class JointCovariance:
 
     @property
     def correlation(self) -> Array:
-        """Correlation coefficients, float64[p, p] between -1 and 1; NaN where a parameter is not determined or exact."""
+        """Correlation coefficients, float64[p, p] between -1 and 1; NaN where a parameter is not identifiable or is
+        exact."""
         std = np.where((self.std > 0.0) & np.isfinite(self.std), self.std, math.nan)
         return np.clip(self.matrix / np.outer(std, std), -1.0, 1.0)
 
@@ -72,7 +73,7 @@ class JointCovariance:
         }
 
     def to_dataframe(self, correlation: bool = True) -> "pd.DataFrame":
-        """Correlation, or covariance, as a pandas DataFrame with the parameters' names on both sides.
+        """Correlation, or covariance, as a pandas DataFrame with the parameters' names as rows and columns.
 
         Raises InputError where pandas is not installed.
         """
@@ -80,7 +81,7 @@ class JointCovariance:
         return optional("pandas", "to_dataframe").DataFrame(values, index=self.names, columns=self.names)
 
     def plot(self, axis: "Axes | None" = None) -> "Axes":
-        """Draw the correlation as a coloured matrix; on a new figure where no axis is given."""
+        """Plot the correlation as a coloured matrix, on a new figure where no axis is given."""
         axis = axis_or_new(axis)
         shown = axis.imshow(self.correlation, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
         places = range(len(self.names))

@@ -1,4 +1,5 @@
-"""Values that have left the nominal ones by far, or what is possible: there a fit may be absorbing physics that the model lacks."""
+"""Estimates far from the nominal values or from what is possible: there the fit may absorb effects that the model
+lacks."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,25 +13,25 @@ from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.report.quantity import number, rounded, with_written_unit
 
-TIMES = 4.0  # ratio of a value to the nominal one from which the shift is told
-SAMPLES = (
-    10.0  # sample periods by which a delay may exceed the nominal one: a longer one is seldom transport alone
-)
-MILLION = 1e6  # ratio from which only that is told: one of the two values is no value of a machine
-PASSED_BY = 2.0  # standard deviations by which a limit has to be passed
-# standard deviations, and a share of a sample, by which a delay has to come out negative to be told: a machine without any delay
-# would be accused once in 40 times at two of them
+TIMES = 4.0  # ratio of an estimate to the nominal value above which the shift is reported
+# sample periods by which a delay may exceed the nominal one: a longer one is seldom transport delay alone
+SAMPLES = 10.0
+MILLION = 1e6  # ratio above which only the shift is reported: one of the two values is not physical
+PASSED_BY = 2.0  # standard deviations by which an estimate has to exceed a limit
+# standard deviations, and a share of a sample, by which a delay has to be negative to be reported: with two
+# standard deviations, a machine without delay would be reported once in 40 times
 EARLY, EARLY_LEAST = 4.0, 0.05
-AGREES = 5.0  # standard deviations of the closure within which limit cycle and response see the same delays
+# standard deviations of the closure within which limit cycle and response agree about the delays
+AGREES = 5.0
 ABSORBING = "the fit may be absorbing missing physics"
 
 
 def large_shifts(
     nominal: Model, parameters: Mapping[str, Estimate], delays: Delays, records: Sequence[Record]
 ) -> tuple[Caution, ...]:
-    """Values that have left the nominal ones by far, and delays that no machine has or that are longer than any of the `records`.
+    """Estimates far from the nominal values, and delays that are impossible or longer than any of the `records`.
 
-    A delay of which the records give no standard deviation is told by its value alone: it is printed as well.
+    A delay without a standard deviation is judged by its value alone, because it is printed as well.
     """
     period = records[0].output.period
     length = max(float(np.ptp(record.output.time)) for record in records)
@@ -67,7 +68,7 @@ def _values(nominal: Model, parameters: Mapping[str, Estimate]) -> Iterator[Caut
 
 
 def _times(ratio: float) -> str:
-    """How a value is to the nominal one, whose size no figure tells where it is a million times the other or more."""
+    """The ratio to the nominal value in words; without a number where it is a million or more."""
     if abs(ratio) >= MILLION:
         return "more than a million times"
     if 0.0 < ratio <= 1.0 / MILLION:
@@ -76,7 +77,7 @@ def _times(ratio: float) -> str:
 
 
 def _negative_delays(nominal: Model, delays: Delays, period: float) -> Iterator[Caution]:
-    """Delays by which the machine would answer before it is asked."""
+    """Negative delays, with which the machine would respond before the command."""
     for side, found, expected in _estimated(nominal, delays):
         if found.value is None or found.value >= -max(EARLY * (found.std or 0.0), EARLY_LEAST * period):
             continue
@@ -90,8 +91,8 @@ def _negative_delays(nominal: Model, delays: Delays, period: float) -> Iterator[
 
 
 def _long_delays(nominal: Model, delays: Delays, period: float, length: float) -> Iterator[Caution]:
-    """Delays that are long; not where the limit cycle, which sees them another way than the response does, agrees, unless they are longer
-    than the record, within which no answer to any command would be."""
+    """Long delays. A delay that agrees with the limit cycle, an independent measurement, is not reported unless it
+    exceeds the record's length: then the record would contain no response to any command."""
     agree = delays.separable and delays.closure is not None and abs(delays.closure) <= AGREES
     for side, found, expected in _estimated(nominal, delays):
         if found.value is None:
@@ -100,7 +101,7 @@ def _long_delays(nominal: Model, delays: Delays, period: float, length: float) -
         long = found.value - expected - PASSED_BY * (found.std or 0.0) > SAMPLES * period
         if not beyond and (agree or not long):
             continue
-        if beyond:  # its size says nothing
+        if beyond:  # its value has no meaning
             told = (
                 f"longer than the record of {number(length, 3)} s, which holds no answer to any command then"
             )
@@ -117,7 +118,7 @@ def _long_delays(nominal: Model, delays: Delays, period: float, length: float) -
 
 
 def _size(found: Estimate) -> str:
-    """A delay in ms with its standard deviation, or that the records give none."""
+    """A delay in ms with its standard deviation, or a remark that it has none."""
     value = 1e3 * (found.value or 0.0)
     if found.std is None:
         return f"{number(value, 3)} ms, which the records do not determine"
@@ -131,7 +132,7 @@ def _named(side: str) -> str:
 
 
 def _estimated(nominal: Model, delays: Delays) -> list[tuple[str, Estimate, float]]:
-    """Each delay that the records determine, or their sum, by name with its estimate and nominal value [s]."""
+    """Each identifiable delay, or their sum, by name with its estimate and nominal value [s]."""
     given = {side: nominal.parameters.get(f"{side}_delay.delay") for side in ("input", "measurement")}
     known = {side: 0.0 if one is None else one.value for side, one in given.items()}
     if not delays.separable:

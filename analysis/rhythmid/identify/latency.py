@@ -3,8 +3,8 @@
     delays: {input: {value: 0.04, std: 1.7e-05}, measurement: {…}, sum: {…}, separable: true, assumption: …}
     model: the identified model, as in model.yaml, delays included
 
-Seconds throughout. A delay that could not be told apart is null; its sum never is. For looking ahead only the sum
-matters: a state measured now is `measurement` old, and a command given now acts `input` later.
+All times are in seconds. A delay that is not identifiable separately is null; the sum is always given. A predictor
+needs only the sum: a state measured now is `measurement` old, and a command given now acts `input` later.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ from rhythmid.validation import Number, validated
 
 @dataclass(frozen=True)
 class Latency:
-    """Delays [s] of the command and measurement paths, None where they are only known as a sum, and the model."""
+    """Delays [s] of the command and measurement paths, None where only their sum is known, and the model."""
 
     input: float | None
     measurement: float | None
@@ -34,7 +34,7 @@ class Latency:
 
     @classmethod
     def load(cls, path: str | Path) -> "Latency":
-        """The latency file at `path`. Raises InputError when it is not one."""
+        """The latency file at `path`. Raises InputError when the file is not a latency file."""
         document = read(path)
         if not isinstance(document.value, Mapping) or not {"delays", "model"} <= document.value.keys():
             raise InputError(f"{path}: not a latency file; `rhythmid identify --save` writes one")
@@ -66,7 +66,7 @@ _DELAYS: TypeAdapter[_Delays] = TypeAdapter(_Delays)
 
 
 def save_latency(found: Identification, path: Path) -> None:
-    """Write the delays and the model of an identification. Raises InputError when not even the sum is known."""
+    """Write the delays and the model of an identification. Raises InputError when the sum of the delays is unknown."""
     if found.delays.sum.value is None:
         raise InputError(
             "no latency to save: the records show no command, so the sum of the delays is unknown"

@@ -1,7 +1,7 @@
-"""Least squares over many rows in little memory: rows that do not fit are replaced by their triangular factor.
+"""Least squares over many rows in little memory: rows beyond a limit are replaced by their triangular factor.
 
-An orthogonal transformation leaves the solution, the rank and the norms of columns as they are (G. H. Golub, Numer. Math. 7 (1965)
-206; in parts: J. Demmel et al., SIAM J. Sci. Comput. 34 (2012) A206).
+An orthogonal transformation keeps the solution, the rank and the norms of columns (G. H. Golub, Numer. Math. 7
+(1965) 206; in parts: J. Demmel et al., SIAM J. Sci. Comput. 34 (2012) A206).
 """
 
 from collections.abc import Iterable
@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-KEPT_ROWS = 30_000  # that are kept as they are: with a hundred columns 24 MB
+KEPT_ROWS = 30_000  # rows that are kept unchanged: 24 MB with a hundred columns
 
 
 def reduced(parts: Iterable[tuple[Array, Array]], most: int = KEPT_ROWS) -> tuple[Array, Array]:
-    """One design (m, p) and target (m,) with the least-squares solution of all parts, (n, p) and (n,) each; with `most` rows or
-    fewer in all, the parts one below the other."""
+    """One design matrix (m, p) and target (m,) with the same least-squares solution as all parts (n, p) and (n,)
+    together. With at most `most` rows in all, the parts are stacked unchanged."""
     kept: list[Array] = []
     for design, target in parts:
         kept.append(np.column_stack([design, target]))
@@ -26,7 +26,7 @@ def reduced(parts: Iterable[tuple[Array, Array]], most: int = KEPT_ROWS) -> tupl
 
 
 def orthonormal(columns: Array) -> Array:
-    """Orthonormal basis (n, r) of what these columns (n, p) span; those that depend on others, or are nothing, add nothing."""
+    """Orthonormal basis (n, r) of the span of these columns (n, p); linearly dependent and zero columns add nothing."""
     norms = np.linalg.norm(columns, axis=0)
     if not np.any(norms > 0.0):
         return np.zeros((len(columns), 0))

@@ -1,8 +1,9 @@
 """Physical parameters from the magnitudes of HTFs alone, which delays leave unchanged: the paper's equation (8).
 
-|H_m(jω)| = |G_m(jω)|, so parameters of the undelayed model are fitted to |Ĥ_m| before anything is known of the delays. The model's
-HTFs pass through the same smoothing, equation (5), as the data's did before the two are compared; its bias then cancels.
-What the HTFs do not show, such as the rest length, is taken from the mean of the limit cycle.
+|H_m(jω)| = |G_m(jω)|, so the parameters of the undelayed model can be fitted to |Ĥ_m| before the delays are known. The
+model's HTFs pass the same smoothing, equation (5), as the data before the two are compared, so the bias of (5)
+cancels. Parameters that the HTFs do not depend on, such as the rest length, are determined by the mean of the limit
+cycle.
 """
 
 import math
@@ -21,7 +22,7 @@ from rhythmid.model import Model
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 POOR_MAGNITUDE = 0.5  # relative misfit of the magnitudes above which other starts are tried
-FIRST_LOOK = 200  # frequencies at which a first look is taken
+FIRST_LOOK = 200  # number of frequencies for a first evaluation
 SCAN = np.geomspace(0.4, 2.5, 17)
 
 
@@ -31,10 +32,10 @@ class MagnitudeFit:
 
     Attributes
     ----------
-    model : with the fitted `values` (p,) of the parameters `names`, covariance (p, p); infinite variance where the
-        magnitudes and the mean do not determine a parameter.
+    model : with the fitted `values` (p,) of the parameters `names` and covariance (p, p); infinite variance where a
+        parameter is not identifiable from the magnitudes and the mean.
     linearised : its limit cycle and harmonic state space.
-    expected : complex128[h, n] its HTFs as (5) would show them, at the estimate's positive frequencies.
+    expected : complex128[h, n] its HTFs after the smoothing of (5), at the estimate's positive frequencies.
     misfit : rms(|Ĝ| − |expected|) / rms(|Ĝ|).
     """
 
@@ -53,7 +54,7 @@ class MagnitudeFit:
 
 
 def undelayed_parameters(model: Model) -> list[str]:
-    """Free parameters other than those of transport delays, noise and rounding, which no magnitude shows."""
+    """Free parameters other than those of transport delays, noise and rounding, on which no magnitude depends."""
     shown = {term.label for term in model.terms if term.element.kernel is not None} | {"inertia"}
     return [name for name in model.free if name.rsplit(".", 1)[0] in shown]
 
@@ -73,7 +74,7 @@ class _Comparison:
         cycle = self.operator.spectra.cycle
         self.mean = float(cycle[0].real)
         motion = float(np.abs(cycle[1:]).max(initial=0.0)) or 1.0
-        # the mean is known so well that it must be met; it must not spoil the conditioning either
+        # the mean is known so accurately that it must be matched; its weight must not spoil the conditioning either
         self.mean_weight = self.size * math.sqrt(self.measured.size) / (1e-2 * motion)
         self.guess: Array | None = None
         self.latest: tuple[Array, Array] | None = None
@@ -88,7 +89,7 @@ class _Comparison:
         return self.operator.smooth(self.operator.model_htf(model.htf))[:, self.keep]
 
     def residual(self, values: Array) -> Array:
-        """Differences (h n + 1,); huge where the model has no limit cycle."""
+        """Weighted differences (h n + 1,); huge where the model has no limit cycle."""
         if self.latest is not None and np.array_equal(self.latest[0], values):
             return self.latest[1]
         found = self._residual(values)
@@ -118,7 +119,7 @@ class _Comparison:
         return np.stack(columns, axis=1)
 
     def rough(self, values: Array) -> float:
-        """Relative misfit of the magnitudes at some of the frequencies, without the smoothing: enough for a first look."""
+        """Relative misfit of the magnitudes at some of the frequencies, without the smoothing, for a first evaluation."""
         try:
             model = self.linearised(values)
         except InputError:
@@ -146,7 +147,7 @@ def _descend(comparison: _Comparison, start: Array) -> tuple[Array, Array]:
 
 
 def _scan(cost: Callable[[Array], float], start: Array) -> Array:
-    """Best of a multiplicative grid, one parameter after the other, twice around those that matter."""
+    """Best point of a multiplicative grid, one parameter after the other, in two passes over the sensitive parameters."""
     values, best = start.copy(), cost(start)
     order = list(range(len(values)))
     for _ in range(2):
@@ -172,7 +173,7 @@ def fit_magnitude(estimate: HtfEstimate, model: Model) -> MagnitudeFit:
     names = undelayed_parameters(model)
     comparison = _Comparison(estimate, model, names)
     start = np.array([model.value(name) for name in names])
-    comparison.linearised(start)  # says why when even these values do not work
+    comparison.linearised(start)  # raises the reason when even these values do not work
     if comparison.rough(start) > POOR_MAGNITUDE:
         start = _scan(comparison.rough, start)
     values, residual = _descend(comparison, start) if names else (start, comparison.residual(start))
@@ -191,7 +192,7 @@ def fit_magnitude(estimate: HtfEstimate, model: Model) -> MagnitudeFit:
 
 
 def _covariance(comparison: _Comparison, values: Array, residual: Array) -> Array:
-    """Covariance (p, p) by the scatter of the residual; neighbouring bins share their noise through the smoothing."""
+    """Covariance (p, p) from the scatter of the residual; the smoothing correlates the noise of neighbouring bins."""
     jacobian = comparison.jacobian(values)
     norms = np.linalg.norm(jacobian, axis=0)
     dead = norms <= 1e-12 * norms.max(initial=0.0)

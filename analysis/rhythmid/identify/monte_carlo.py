@@ -1,4 +1,4 @@
-"""Monte Carlo of an estimator: noise drawn anew, the scatter of what is found, how often its intervals hold the truth."""
+"""Monte Carlo test of an estimator: new noise for each fit, scatter of the estimates, and coverage of their intervals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from rhythmid.statistics import NORMAL_95
 
 @dataclass(frozen=True)
 class Drawn:
-    """What one fit found: `values` and stated standard deviations `std` by name."""
+    """Result of one fit: `values` and stated standard deviations `std` by name."""
 
     values: Mapping[str, float]
     std: Mapping[str, float]
@@ -26,7 +26,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Scatter:
-    """Standard deviation and bias of estimates, and the share of 95 % intervals that hold the truth."""
+    """Standard deviation and bias of estimates, and the coverage of their 95 % intervals."""
 
     std: float
     bias: float
@@ -34,7 +34,7 @@ class Scatter:
 
 
 def noisy(record: Record, std: float, seed: int) -> Record:
-    """The record with white noise of so much on its output [output unit]; the same for the same seed."""
+    """The record with white noise of standard deviation `std` [output unit] on its output, reproducible by `seed`."""
     output = record.output
     value = output.value + std * np.random.default_rng(seed).standard_normal(len(output))
     return replace(record, output=replace(output, value=value))

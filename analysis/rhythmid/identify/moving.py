@@ -1,4 +1,5 @@
-"""Records in which the machine moves: of those in which it stands still nothing can be learnt, and a fit only follows their noise."""
+"""Selection of records in which the machine moves. Records at rest contain no information; a fit would only follow
+their noise."""
 
 from collections.abc import Sequence
 
@@ -8,10 +9,10 @@ from rhythmid.record.standstill import standstill
 
 
 def moving(clean: Sequence[Cleaned]) -> tuple[list[Cleaned], tuple[str, ...]]:
-    """The records in which the machine moves, and a note on each other one, which is left out.
+    """The records in which the machine moves, and a note on each record that is left out.
 
-    Noise in which a motion may be buried is judged by what a fit makes of it. Raises InputError where the machine stands still in
-    all of them.
+    Noise that may hide a motion is kept and judged by the fit. Raises InputError where the machine is at rest in all
+    records.
     """
     found = [(one, standstill(one.record, buried=False)) for one in clean]
     kept = [one for one, still in found if still is None]

@@ -1,7 +1,8 @@
 """Multiple shooting: windows of a record, each with an initial state of its own.
 
-H. G. Bock, Progress in Scientific Computing 2 (1983) 95. A free run of a machine that integrates, or is unstable, adds up
-every small disturbance and error of the model until it means nothing; in short windows it cannot get far.
+H. G. Bock, Progress in Scientific Computing 2 (1983) 95. The free run of a machine that integrates, or is unstable,
+accumulates every small disturbance and model error until it is meaningless. In short windows it stays near the
+data.
 """
 
 import math
@@ -25,26 +26,27 @@ from rhythmid.model import Model
 from rhythmid.simulation.signal import first_order_hold
 
 MARGIN = 1.0  # [s] of a command kept before a window, for delays
-PUSH = 1e-3  # of the machine's inertial force: the constant force whose effect is looked at
-# of the effect of the push, from the middle to the end of a record, that calls for windows: in proportion to time it grows 2.1-fold
+PUSH = 1e-3  # constant test force as a share of the machine's inertial force
+# growth of the effect of the test force, from the middle to the end of a record, above which windows are needed:
+# growth proportional to time gives 2.1
 GROWTH = 1.5
-# of the whole motion, up to which a displacement that grows is no sign that the machine integrates: three times what the push does to
-# a spring that holds the mass in the dominant motion
+# share of the whole motion below which a growing displacement does not mean that the machine integrates: three
+# times the displacement that the test force causes on a spring which holds the mass in the dominant motion
 HELD = 3.0 * PUSH
-# of the motion at the end of a record, up to which a swing that the push shifts in phase is still the same: twenty times the effect at
-# rest, so that an error of the model of 1.5 % of the forces, which models of real machines have, stays below 30 %
+# share of the motion at the end of a record below which a phase shift by the test force is acceptable: twenty times
+# the effect at rest, so that a force error of 1.5 %, usual in models of real machines, stays below 30 %
 SAME_SWING_SHARE = 0.02
-# of the whole motion, from which the run with the push has nothing in common with the one without: runs of a chaotic machine end
-# 1.4 times the motion apart, and no further
+# share of the whole motion above which the run with the test force is unrelated to that without it: runs of a
+# chaotic machine end 1.4 times the motion apart, and no further
 PARTED = 0.5
-WINDOW_PERIODS = 2.0  # of the dominant motion in a window
-FEWEST_WINDOWS = 4  # windows a record
+WINDOW_PERIODS = 2.0  # periods of the dominant motion in a window
+FEWEST_WINDOWS = 4  # windows per record
 LEAST_BLOCKS = 24  # blocks in a window
-MOST_WINDOWS = 200  # windows of all records; every one costs a run
+MOST_WINDOWS = 200  # largest number of windows of all records; each costs a simulation
 
 
 def _around(signal: PPoly | None, begin: float, end: float) -> PPoly | None:
-    """The pieces of a signal that matter between two times [s]."""
+    """The pieces of a signal that are needed between two times [s]."""
     if signal is None:
         return None
     first = max(int(np.searchsorted(signal.x, begin - MARGIN, side="right")) - 2, 0)
@@ -53,7 +55,7 @@ def _around(signal: PPoly | None, begin: float, end: float) -> PPoly | None:
 
 
 def split(series: Series, length: float) -> list[Series]:
-    """Cut a series into windows of about `length` [s], each of which gets a start of its own."""
+    """Cut a series into windows of about `length` [s], each with an initial state of its own."""
     size = max(8 * series.block, round(length / series.period / series.block) * series.block)
     parts: list[Series] = []
     covered = (
@@ -77,15 +79,15 @@ def split(series: Series, length: float) -> list[Series]:
 
 
 def periods_long(series: Series) -> float:
-    """Length [s] of windows that hold a few periods of the motion."""
+    """Window length [s] of a few periods of the motion."""
     step = series.period * series.block
     length = max(WINDOW_PERIODS / dominant_frequency(series), LEAST_BLOCKS * step)
     return min(length, series.blocks * step / FEWEST_WINDOWS)
 
 
 def windows(series: Sequence[Series], length: float) -> list[Series]:
-    """All series cut into windows of about `length` [s]; a short rest at the end of one is left out, and of very many
-    windows only every second, third, … is kept."""
+    """All series cut into windows of about `length` [s]. A short remainder at the end of a series is left out. Of
+    very many windows only every second, third, … is kept."""
     found: list[Series] = []
     for one in series:
         parts = split(one, length)
@@ -96,9 +98,9 @@ def windows(series: Sequence[Series], length: float) -> list[Series]:
 def forgets(model: Model, series: Sequence[Series]) -> bool:
     """Whether the effect of a small constant force on the model levels off within the longest stretch of every record.
 
-    Where it displaces the machine ever further, this integrates or is unstable, and so does the effect of whatever the model
-    leaves out. It also shifts the phase of a lightly damped swing, a little more with every period; that is no harm as long as
-    the shifted swing differs little from the other.
+    A displacement that keeps growing means that the machine integrates or is unstable. Then the effect of every
+    model error grows, too. The force also shifts the phase of a lightly damped oscillation a little more with every
+    period. That is acceptable as long as the shifted oscillation differs little from the other.
     """
     series = longest_of_each(series)
     run = prepare_run(model, series, disturbed=True)

@@ -1,8 +1,8 @@
-"""Natural size of a parameter: what it would have to be to matter, from its unit and the scales of the records.
+"""Natural size of a parameter: the value at which it would matter, from its unit and the scales of the records.
 
-Its own value is no measure of how well a parameter is known: one whose true value is 0 has a standard deviation beyond any value. A
-length is measured by the motion, a force by what drives it, a time by the motion's period, a coefficient by what makes such a force
-from such a motion: a damper of that size takes all of the force.
+The parameter's own value is no scale for its uncertainty: with a true value of 0 every standard deviation exceeds
+it. A length is scaled by the motion, a force by the driving force, a time by the motion's period. A coefficient is
+scaled by the ratio of such a force to such a motion: a damper of that size takes all of the force.
 """
 
 import math
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def natural_size(unit: str, known: Scales) -> float | None:
-    """Size of a parameter with the unit of a translational machine; None where the unit is none of mechanics."""
+    """Size of a parameter by its unit, for a translational machine; None where the unit is not mechanical."""
     radian = 1.0 / (2.0 * math.pi * known.frequency)
     sizes = {
         "N": known.effort,
@@ -38,9 +38,9 @@ def natural_size(unit: str, known: Scales) -> float | None:
 
 
 def sizes_of(model: Model, names: Sequence[str], series: Sequence[Series]) -> Array:
-    """Sizes (p,) by which a change of the parameters `names` is measured: natural ones, or the values where these are larger.
+    """Sizes (p,) that scale changes of the parameters `names`: natural sizes, or the values where these are larger.
 
-    A time is measured by the motion's period / 2π however long it is: that far apart two delays are two phases.
+    A time is always scaled by the motion's period / 2π: two delays that far apart are two phases.
     """
     known = scales(series, model)
     units = {INERTIA: "kg"} | {

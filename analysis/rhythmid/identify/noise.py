@@ -1,7 +1,8 @@
-"""Colour of the noise: an autoregressive model of residuals, and the filter that whitens them.
+"""Coloured noise: an autoregressive model of residuals, and its whitening filter.
 
-P. Stoica, R. Moses, Spectral Analysis of Signals, 2005, section 3.4 (Levinson-Durbin recursion). Coloured noise that is
-taken for white makes every test shout; whitening makes least squares the maximum-likelihood estimate again.
+P. Stoica, R. Moses, Spectral Analysis of Signals, 2005, section 3.4 (Levinson-Durbin recursion). With coloured
+noise taken for white, every test gives false alarms. After whitening, least squares is the maximum-likelihood
+estimate.
 """
 
 from collections.abc import Sequence
@@ -13,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter, lfiltic
 
 Array = NDArray[np.float64]
-TINY = 1e-12  # of a variance that a predictor leaves, at least
-PREDICTED = 25.0  # power of a residual over what its own past leaves of it, beyond which it is no noise
+TINY = 1e-12  # least share of the variance that a predictor leaves
+PREDICTED = 25.0  # ratio of a residual's power to that of its innovations above which it is not noise
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class NoiseModel:
 
     @property
     def variance(self) -> float:
-        """Variance of the noise itself."""
+        """Variance of the noise n_k."""
         if self.order == 0:
             return self.std**2
         response = 1.0 - np.fft.rfft(np.concatenate([[0.0], self.coefficients]), 4096)
@@ -38,22 +39,24 @@ class NoiseModel:
 
     @property
     def is_structure(self) -> bool:
-        """Whether it is no noise at all, but motion that a model misses: nearly all of it follows from its own past."""
+        """Whether this is motion that a model misses rather than noise: nearly all of it is predictable from its
+        own past."""
         return self.variance > PREDICTED * self.std**2
 
     @property
     def predictable(self) -> float:
-        """Share of its rms that follows from its own past; 0 of white noise."""
+        """Share of the rms that is predictable from the noise's own past; 0 for white noise."""
         return float(np.sqrt(max(1.0 - self.std**2 / self.variance, 0.0)))
 
     @property
     def long_run_variance(self) -> float:
-        """Spectral density at zero frequency: what slow averages of the noise scatter with."""
+        """Spectral density at zero frequency, which determines the scatter of long averages of the noise."""
         return float(self.std**2 / (1.0 - self.coefficients.sum()) ** 2)
 
     @cached_property
     def _beginnings(self) -> tuple[tuple[Array, float], ...]:
-        """Predictors of the orders 0 … p − 1 and the standard deviations that they leave, by the recursion run backwards."""
+        """Predictors of the orders 0 … p − 1 with the standard deviations of their innovations, by the recursion
+        run backwards."""
         found: list[tuple[Array, float]] = []
         a, std = self.coefficients, self.std
         while len(a):
@@ -66,8 +69,8 @@ class NoiseModel:
     def whiten(self, samples: Array) -> Array:
         """Innovations in units of their standard deviations; (n,) or (n, q) of the same shape.
 
-        The first p samples are predicted from as many as there are before them, which makes the sum of squares that of
-        the exact likelihood: no part of a stretch is free.
+        The first p samples are predicted from the samples that precede them, however few. So the sum of squares is
+        that of the exact likelihood, and every part of a stretch counts.
         """
         p, n = self.order, len(samples)
         white = np.empty_like(samples, dtype=float)
@@ -95,13 +98,13 @@ class NoiseModel:
 
 
 def runs(used: NDArray[np.bool_]) -> list[slice]:
-    """Unbroken stretches of True."""
+    """Slices of contiguous True values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], used.astype(np.int8), [0]])))
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2])]
 
 
 def estimate_noise(residuals: Sequence[Array], highest: int = 24, floor: float = 1e-300) -> NoiseModel:
-    """Autoregressive model of residual stretches (n_i,), its order chosen by the Bayesian information criterion."""
+    """Autoregressive model of residual stretches (n_i,); the Bayesian information criterion selects the order."""
     stretches = [r for r in residuals if len(r) > 8]
     total = sum(len(r) for r in stretches)
     if total == 0:
@@ -129,10 +132,11 @@ def estimate_noise(residuals: Sequence[Array], highest: int = 24, floor: float =
 
 
 def burg(stretches: Sequence[Array], highest: int = 24) -> NoiseModel:
-    """Autoregressive model of stretches (n_i,) by Burg's method, its order chosen by the Bayesian information criterion.
+    """Autoregressive model of stretches (n_i,) by Burg's method; the Bayesian information criterion selects the order.
 
-    For noise that a lightly damped machine remembers: sample covariances take a stretch to be zero beyond its ends, which hides such a
-    colour. (J. P. Burg, Maximum Entropy Spectral Analysis, thesis, Stanford 1975; Stoica, Moses, section 3.9.3.)
+    For noise that excites a lightly damped machine. Sample covariances treat a stretch as zero beyond its ends,
+    which hides such a narrow spectrum. (J. P. Burg, Maximum Entropy Spectral Analysis, thesis, Stanford 1975;
+    Stoica, Moses, section 3.9.3.)
     """
     forward = backward = [one for one in stretches if len(one) > 2 * highest]
     total = sum(len(one) for one in forward)

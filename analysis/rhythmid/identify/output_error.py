@@ -21,13 +21,14 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 
 Array = NDArray[np.float64]
-LOST = 0.3  # error, as a share of the motion, above which a model has lost the machine
-# times the error of ordinary least squares, beyond which the fit that is weighted by the noise's colour is not given. What is left of
-# noise costs the weighted fit next to nothing of it; motion that the model misses is whitened away and given up for what is left
+LOST = 0.3  # error as a share of the motion above which the model no longer follows the machine
+# largest ratio of the error of the whitened fit to that of ordinary least squares. With a noise residual the
+# whitened fit costs almost nothing; motion that the model misses would be whitened away and traded for a smaller
+# innovation
 MISLED = 1.25
-# chi2 that it may cost to put a parameter on its bound where the fit says that it cannot tell
+# increase of chi2 up to which a parameter is fixed at a bound that it cannot be distinguished from
 FALSE_EDGE = 25.0
-# of the residual, below which an error of integration has to stay: it must not count among models
+# largest integration error as a share of the residual: it must not affect the comparison of models
 INTEGRATION = 0.02
 
 
@@ -35,9 +36,10 @@ INTEGRATION = 0.02
 class Fit:
     """A fitted model.
 
-    `values` (p,) of the parameters `names` with `covariance` (p, p); `starts` the state of each series at its first
-    block; `residuals` simulated less measured block averages; `chi2` the whitened sum of squares over `samples`
-    averages that were used. `converged` is False where the search stopped for another reason, told by `message`.
+    `values` (p,) of the parameters `names` have `covariance` (p, p). `starts` holds the state of each series at its
+    first block, `residuals` simulated minus measured block averages. `chi2` is the whitened sum of squares over the
+    `samples` averages that were used. `converged` is False where the search stopped for another reason, given in
+    `message`.
     """
 
     model: Model
@@ -57,7 +59,7 @@ class Fit:
 
     @property
     def std(self) -> dict[str, float]:
-        """Standard deviation of each free parameter; infinite where the records do not determine it."""
+        """Standard deviation of each free parameter; infinite where it is not identifiable."""
         return {
             name: float(math.sqrt(v)) if v >= 0 else math.inf
             for name, v in zip(self.names, np.diag(self.covariance))
@@ -65,7 +67,7 @@ class Fit:
 
     @property
     def differences(self) -> tuple[Array, Array]:
-        """Steps of parameters (p,) and initial states (q,) by which the sensitivities were taken."""
+        """Finite-difference steps of parameters (p,) and initial states (q,) for the sensitivities."""
         return np.abs(self.linearisation.steps), self.linearisation.state_steps
 
     def nrmse(self, hidden: bool = False) -> float:
@@ -99,7 +101,8 @@ def minimise(
 ) -> Fit:
     """The fit that `descend` leads to, with its sensitivities and covariance.
 
-    A parameter that the records cannot tell from its bound is put there: what else it would be drags others along.
+    A parameter that cannot be distinguished from its bound is fixed there: another value would shift other
+    parameters as well.
     """
     fit = _fit(
         descend(model, run, names, noise, starts, iterations, pool, tolerance, differences, reach),
@@ -124,7 +127,7 @@ def minimise(
                 reach=fit.chi2 + FALSE_EDGE,
             )
         except InputError:
-            # such as without inertia: a value far from its bound, but undetermined together with others
+            # e.g. without inertia: a value far from its bound, but undetermined together with others
             return fit
         if end.chi2 < fit.chi2 + FALSE_EDGE:
             return _fit(end, run, names, noise, pool)
@@ -163,12 +166,13 @@ def _fit(
 
 
 def noise_of(residuals: Sequence[Array], series: Sequence[Series], floor: float = 0.0) -> NoiseModel:
-    """Noise model of residuals over the averages that were used; its colour is that of the series where they know it."""
+    """Noise model of residuals over the averages that were used; its spectrum is that stored in the series where
+    they have one."""
     return coloured(_stretches(residuals, series), series, floor)
 
 
 def _stretches(residuals: Sequence[Array], series: Sequence[Series]) -> list[Array]:
-    """Residuals of each run of averages that were used, as they are whitened: without what is ignored, and levelled."""
+    """Residuals of each contiguous run of used averages before whitening: without ignored components, and levelled."""
     stretches = []
     for residual, one in zip(residuals, series):
         if one.ignored is not None:
@@ -179,7 +183,7 @@ def _stretches(residuals: Sequence[Array], series: Sequence[Series]) -> list[Arr
 
 
 def coloured(stretches: Sequence[Array], series: Sequence[Series], floor: float) -> NoiseModel:
-    """Noise model of what is left in stretches of these series."""
+    """Noise model of the residuals in stretches of these series."""
     colour = series[0].colour
     if colour is None:
         return estimate_noise(stretches, floor=floor)
@@ -200,8 +204,9 @@ def estimate(
 ) -> Fit:
     """Maximum-likelihood estimate of the model's free parameters (or of `names`) from all series.
 
-    Least squares first; then, with `noise` None, the colour of the residuals is estimated and the fit repeated in
-    whitened form, which makes it efficient and its covariance honest. Raises InputError when the model diverges.
+    Ordinary least squares is first. With `noise` None, the noise model is then estimated from the residuals and the
+    fit is repeated with whitening, which makes it efficient and its covariance valid. Raises InputError when the
+    model diverges.
     """
     chosen = tuple(model.free if names is None else names)
     run = prepare_run(model, series, max_step)
@@ -210,11 +215,11 @@ def estimate(
         return minimise(model, run, chosen, noise, guess, iterations, pool)
     spread = max(float(np.std(one.averaged)) for one in series)
     scaled = NoiseModel(np.empty(0), spread * 1e-2)
-    # what a start far off misses is no noise, and is not larger where the noise is: the weights of that would hide it
+    # the residual of a distant start is not noise; weights from it would hide the error where it is large
     alike = replace(run, series=tuple(replace(one, spread=None) for one in run.series))
     end = descend(model, alike, chosen, scaled, guess, iterations, pool)
     if normalised_error(end.residuals, series) > LOST:
-        # what is left is no noise: taken for colour, it would lead the parameters anywhere
+        # the residual is not noise: whitening it would lead to arbitrary parameters
         left = np.concatenate(_stretches(end.residuals, run.series))
         white = NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
         lost = minimise(end.model, run, chosen, white, end.starts, iterations, pool)
@@ -226,7 +231,7 @@ def estimate(
         coarsest = sufficient(run, end.model, end.starts, max(INTEGRATION * rms, 1e-7 * spread))
         if coarsest is run:
             break
-        run = halved(coarsest)  # the smaller residual may ask for finer steps still
+        run = halved(coarsest)  # the smaller residual may need finer steps
         end = descend(
             end.model, run, chosen, scaled, end.starts, iterations, pool, differences=end.differences
         )
@@ -253,7 +258,7 @@ def rerun(model: Model, series: Sequence[Series], noise: NoiseModel, step: float
 
 
 def start_only(model: Model, series: Sequence[Series], noise: NoiseModel, max_step: float) -> Fit:
-    """Free run over records that the model has not seen: only their initial states are estimated, whatever the time."""
+    """Free run over held-out records: only their initial states are estimated, without a time limit."""
     run = prepare_run(model, series, max_step)
     with without_deadline():
         return minimise(model, run, (), noise)

@@ -1,4 +1,5 @@
-"""Zeros that differ from record to record, noticed by a fit to several records: each becomes a nuisance of the fit."""
+"""Zeros that differ from record to record, detected by a fit to several records: each becomes a nuisance parameter
+of the fit."""
 
 import math
 from dataclasses import replace
@@ -18,15 +19,17 @@ from rhythmid.identify.timing import EVIDENT_BY
 from rhythmid.identify.zero_estimates import zeros_told
 
 Array = NDArray[np.float64]
-# of the squared error, that zeros may leave of it: they are nearly all that is wrong. Else it may be physics by which the mean of a motion
-# shifts with its amplitude, which a search among effects can tell and this cannot (a hopper with a quadratic spring leaves 0.36)
+# share of the squared error that free zeros may leave: they must explain nearly all of it. A larger rest may be an
+# effect that shifts the mean with the amplitude, which only a search among effects can tell (a hopper with a
+# quadratic spring leaves 0.36)
 LEFT = 0.2
 
 
 def zero_scores(fit: Fit) -> Array:
-    """How many standard deviations each record's zero, but the first's, is off that of the first, (r - 1,), to first order.
+    """Deviation of each record's zero from that of the first, in standard deviations, (r - 1,), to first order.
 
-    Under white noise, for what a model lacks is none, and with standard deviations that the scores of blocks bear out.
+    White noise is assumed, because the effect of a missing element is not noise. The standard deviations are
+    confirmed by the scores of blocks.
     """
     left = np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series, strict=True)])
     white = NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
@@ -51,7 +54,7 @@ def zero_scores(fit: Fit) -> Array:
 
 
 def with_own_zeros(joint: JointFit) -> tuple[JointFit, tuple[str, ...]]:
-    """The fit with a zero of each record where the records have them, and what was found, in words."""
+    """The fit with a zero for each record where the records differ in it, and messages about the zeros."""
     fit, kept = joint.fit, (joint, ())
     series = fit.run.series
     several = len({record_of(one) for one in series}) > 1
@@ -61,7 +64,7 @@ def with_own_zeros(joint: JointFit) -> tuple[JointFit, tuple[str, ...]]:
         if np.abs(zero_scores(fit)).max() < EVIDENT_BY:
             return kept
         free = estimate(with_record_zero(fit.model), others_marked(series), max_step=fit.run.max_step)
-        # a fit that was stuck gains by being made again, whatever else is free
+        # a stuck fit improves when it is repeated, whatever else is free
         values = {name: free.model.value(name) for name in fit.names}
         again = estimate(fit.model.with_values(values), series, max_step=fit.run.max_step)
     except InputError:

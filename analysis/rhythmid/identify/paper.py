@@ -22,14 +22,14 @@ TABLE = (0, -1, 1)  # harmonics of the paper's Table 1
 
 @dataclass(frozen=True, eq=False)
 class PaperResult:
-    """What the paper's method finds in one record.
+    """Result of the paper's method for one record.
 
     Attributes
     ----------
     estimate : Ĥ_m by (5).
     fit : parameters by (8).
-    delays : by (15)-(16) from each harmonic alone, of those that the excitation reaches.
-    combined : by (9) from several harmonics at once; None where only their sum can be had.
+    delays : by (15)-(16) from each single harmonic that the excitation reaches.
+    combined : by (9) from several harmonics together; None where only the sum is identifiable.
     loss : predicted relative loss of the peak of each |G_m| by the smoothing of (5), in the order of the harmonics.
     """
 
@@ -46,7 +46,8 @@ class PaperResult:
 def paper_method(record: Record, model: Model, pumping: Pumping, harmonics: int = HARMONICS) -> PaperResult:
     """Identify `model` and its delays from a record by the paper's method.
 
-    Raises InputError when the record has no input or one that never changes, is too short, or the model has no limit cycle.
+    Raises InputError when the record has no input, a constant input or too few samples, or when the model has no
+    limit cycle.
     """
     if record.input is None:
         raise InputError(
@@ -55,7 +56,7 @@ def paper_method(record: Record, model: Model, pumping: Pumping, harmonics: int 
     if np.ptp(record.input.value) == 0.0 and np.any(record.input.value):
         raise InputError(f"{record.name}: its input never changes; transfer functions need an excitation")
     ring_down = linearised(model, pumping).cycle.ring_down
-    for _ in range(2):  # the smoothing follows the ring-down, which is known once the model is fitted
+    for _ in range(2):  # the smoothing depends on the ring-down, which is known after the first fit
         measured = spectra(record, pumping, ring_down, harmonics + 1)
         estimate = estimate_htf(regularised_least_squares(measured, harmonics, ring_down=ring_down))
         fit = fit_magnitude(estimate, model)

@@ -1,21 +1,23 @@
-"""Whether harmonic transfer functions, and the paper's method, mean anything for a record: what they need, and what is missing."""
+"""Conditions for harmonic transfer functions and for the paper's method, and which of them a record does not meet."""
 
 import numpy as np
 
 from rhythmid.identify.paper import PaperResult
 from rhythmid.ltp.pumping import Pumping
 
-LEAKAGE = 0.05  # of the command that may differ before and at the end of the window
-# of the limit cycle's motion (rms) that the response to the command may have: a quadratic law bends the response by as much
+# largest difference between the commands before and at the end of the window, as a share of the command
+LEAKAGE = 0.05
+# largest response to the command relative to the limit cycle's motion (rms): with a quadratic law the response is
+# distorted by as much
 SMALL_RESPONSE_SHARE = 0.1
-FREEDOM = (
-    0.8  # of the equations' degrees of freedom that the estimate may take; a fifth is left to tell its error
-)
+# share of the equations' degrees of freedom that the estimate may use; a fifth is left to estimate its error
+FREEDOM = 0.8
 NO_FORCING = "no periodic forcing is known: harmonic transfer functions are those of a machine that a forcing keeps on a limit cycle"
 
 
 def lacks_transfer_functions(pumping: Pumping, result: PaperResult | str) -> str | None:
-    """What is missing for harmonic transfer functions; None where nothing is. `result` is the reason where there is none."""
+    """Missing condition for harmonic transfer functions; None where all hold. `result` is the reason where there
+    are none."""
     if not pumping.active:
         return NO_FORCING
     if isinstance(result, str):
@@ -30,7 +32,7 @@ def lacks_transfer_functions(pumping: Pumping, result: PaperResult | str) -> str
 
 
 def lacks_paper_method(pumping: Pumping, result: PaperResult | str) -> str | None:
-    """What is missing for the paper's method; None where nothing is."""
+    """Missing condition for the paper's method; None where all hold."""
     missing = lacks_transfer_functions(pumping, result)
     if missing is not None or isinstance(result, str):
         return missing

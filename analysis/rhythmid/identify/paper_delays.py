@@ -1,4 +1,4 @@
-"""Delays by the paper's method from all records together, and the assumption on which their split rests."""
+"""Delays by the paper's method from all records together, and the assumption on which their separation rests."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ NO_FORCING = "no forcing is known, and with it no phase of the machine's cycle"
 
 
 def combined(estimates: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Mean of independent (value, std), each weighed by its variance."""
+    """Inverse-variance weighted mean of independent (value, std)."""
     if len(estimates) == 1:
         return estimates[0]
     values = np.array([value for value, _ in estimates])

@@ -1,4 +1,4 @@
-"""How good the records of an identification are, and what the paper's method leaves of them."""
+"""Quality of the records of an identification, and misfit of the paper's method."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -16,11 +16,11 @@ from rhythmid.simulation.signal import continuous, spline
 from rhythmid.simulation.simulate import simulate
 
 Array = NDArray[np.float64]
-MISFIT = 0.1  # of the magnitudes above which the fit is called into question
+MISFIT = 0.1  # misfit of the magnitudes above which a note is given
 
 
 def notes_of(record: Record, result: PaperResult | None) -> Iterator[str]:
-    """What should make a user doubt the record, or the paper's method where its `result` is shown."""
+    """Reasons to doubt the record, or the paper's method where its `result` is shown."""
     yield from (f"{record.name}: {note}" for note in (*record.quality.notes, *copy_notes(record)))
     if result is None:
         return
@@ -41,7 +41,8 @@ def notes_of(record: Record, result: PaperResult | None) -> Iterator[str]:
 
 
 def quality_of(nrmse: float, records: Sequence[Record], results: Sequence[PaperResult]) -> dict[str, Any]:
-    """Figures of quality of the records and of their spectra, by name; those of spectra only with `results` of the paper's method."""
+    """Quality measures of the records and of their spectra, by name; those of spectra only with `results` of the
+    paper's method."""
     channels = [record.quality for record in records]
     quality = {
         "rate": 1.0 / records[0].output.period,

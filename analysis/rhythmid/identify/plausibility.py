@@ -1,14 +1,15 @@
-"""Channels in another unit, with their sign turned round, or input and output exchanged: found against the nominal model.
+"""Detects channels in another unit or sign, or input and output exchanged, by comparison with the nominal model.
 
-Natural frequency and damping ratio do not depend on the scale of a channel; gains do. So every channel of a short stretch is
-changed as a user may have declared it by mistake, the model is refitted to each, and a change is believed where it explains
-what the record as it is declared leaves. Where a free inertia makes up for a scale, no error shows: there the values tell, which
-all come out shifted, and go back to the given ones under the right change.
+Natural frequency and damping ratio do not depend on the scale of a channel; gains do. So every channel of a short
+stretch is changed in the ways in which a user may have declared it wrongly, and the model is refitted to each. A
+change is accepted where it explains what the record as declared does not. A free inertia can absorb a scale, so
+that no error remains. Then the values tell: all are shifted, and return to the given ones under the right change.
 
-Physics that the model lacks shifts values, too. At one amplitude and speed dry friction looks like more damping, and where the
-damping is all that the motion tells, like more of everything; below its resonance a mass on a spring moves against the sign that it has
-without the spring. So no change is believed before the record as it is declared has been tried with a dry friction, a constant force and
-a spring beside the model's own: they leave a wrong scale as it is, for they do not accelerate a mass.
+Effects that the model lacks shift values, too. At one amplitude and speed dry friction acts like more damping.
+Where only the damping is identifiable, it acts like more of everything. A mass on a spring moves, below its
+resonance, with the opposite sign from the mass without the spring. So before a change is accepted, the record as
+declared is fitted with dry friction, a constant force and a spring added to the model. They cannot absorb a wrong
+scale, because they do not accelerate a mass.
 """
 
 import math
@@ -33,24 +34,24 @@ from rhythmid.model import INERTIA, Model
 from rhythmid.record.record import Record
 from rhythmid.report.quantity import number
 
-STRETCH = 15.0  # periods that are looked at: enough for a resonance of 2 % damping to ring down
-SHORT = 4.0  # the same where a search may lose its way over a longer stretch, such as in large swings
-ITERATIONS = 12  # of each refit: a right change arrives in fewer
-BETTER_UNIT = (
-    0.4  # share of what is unexplained as declared that a change may leave, besides being below `POOR_MOTION`
-)
-TRIED = 3  # records that are looked at until one speaks: a motion that does not repeat, such as a whirling pendulum, cannot
+STRETCH = 15.0  # periods that are used: enough for a resonance of 2 % damping to ring down
+SHORT = 4.0  # periods where a search may fail over a longer stretch, such as in large oscillations
+ITERATIONS = 12  # iterations of each refit: the right change converges in fewer
+# largest ratio of the unexplained share with a change to that as declared; it must also be below `POOR_MOTION`
+BETTER_UNIT = 0.4
+# records that are tried until one is conclusive: an aperiodic motion, such as that of a whirling pendulum, is not
+TRIED = 3
 SHIFTED, BACK = (
     math.log(4.0),
     math.log(2.0),
 )  # mean |log| ratio of the values to the given ones, as declared and with the change
-EQUAL, SAME = 1.2, 0.01  # ratio of errors, and difference of them, within which two changes do the same
-LEAST_UNIT_FACTOR = (
-    4.0  # factor below which a gain is physics (a gain element, a wrong nominal value) and no unit
-)
-STEP = 0.01  # relative step by which the effect of a gain is taken
-TRANSITION = 0.1  # of the usual speed, over which the sign of a friction that is tried turns at first
-GAINS = (0.01, 0.03, 0.1, 10.0, 30.0, 100.0)  # from which the scale of an input in a foreign unit is sought
+EQUAL, SAME = 1.2, 0.01  # ratio of errors, and difference of errors, within which two changes are equivalent
+# factor below which a gain is an effect (a gain element, a wrong nominal value) and not a unit
+LEAST_UNIT_FACTOR = 4.0
+STEP = 0.01  # relative step for the derivative with respect to a gain
+TRANSITION = 0.1  # share of the usual speed over which the sign of the added friction changes at first
+# starting values of the search for the scale of an input in an unknown unit
+GAINS = (0.01, 0.03, 0.1, 10.0, 30.0, 100.0)
 
 
 AS_DECLARED = Change("output")
@@ -58,7 +59,8 @@ AS_DECLARED = Change("output")
 
 @dataclass(frozen=True)
 class Trial:
-    """A change with the `unexplained` share that the refitted model leaves under it and the `shift` of the model's values, the mean
+    """A change, the share of the motion that stays `unexplained` after the refit, and the `shift` of the model's
+    values: the mean
     |log| of their ratio to the given ones."""
 
     change: Change
@@ -69,8 +71,8 @@ class Trial:
 
 @dataclass(frozen=True)
 class Mend:
-    """A change that is believed, in words. `certain` where the record as declared cannot be explained, else the values alone
-    speak for it."""
+    """An accepted change, in words. `certain` where the record as declared cannot be explained; otherwise only the
+    shift of the values supports it."""
 
     change: Change
     text: str
@@ -80,10 +82,10 @@ class Mend:
 def check_plausible(
     model: Model, records: Sequence[Record], pool: ThreadPoolExecutor | None = None
 ) -> str | None:
-    """A warning where the values speak for another unit of a channel.
+    """A warning where the shift of the values suggests another unit of a channel.
 
-    Raises InputError with the likely mend where the records as they are declared cannot be explained and another unit or sign of
-    a channel, or an exchange of input and output, suits the model.
+    Raises InputError with the likely correction where the records as declared cannot be explained, and another unit
+    or sign of a channel, or an exchange of input and output, fits the model.
     """
     mend = likely_mend(model, records, pool)
     if mend is not None and mend.certain:
@@ -94,7 +96,8 @@ def check_plausible(
 def likely_mend(
     model: Model, records: Sequence[Record], pool: ThreadPoolExecutor | None = None
 ) -> Mend | None:
-    """The change of a channel under which the model explains the records, or keeps its values; None where they are plausible."""
+    """The change of a channel under which the model explains the records or keeps its values; None where they are
+    plausible."""
     model = with_declared(model, records)
     driven = [one for one in records if one.input is not None] or list(records)
     for record in sorted(driven, key=lambda one: -float(np.std(one.output.value)))[:TRIED]:
@@ -115,7 +118,7 @@ def _misfit(
     tried: partial[Trial | None],
     pool: ThreadPoolExecutor | None,
 ) -> Mend | None:
-    """The change that explains what the record as declared leaves."""
+    """The change that explains what the record as declared does not."""
     trials = [one for change in likely_changes(record, model) if (one := tried(change)) is not None]
     best = min(trials, key=lambda one: one.unexplained, default=declared)
     if not _convinces(best, declared) or best.change.role == "input":
@@ -125,7 +128,7 @@ def _misfit(
     if not _convinces(best, declared):
         return None
     again = _searched_again(best, record, model, pool)
-    if again is not None:  # the search had only lost its way, or physics is missing
+    if again is not None:  # the search had failed, or an effect is missing
         return _shift(record, again, model, tried, pool) if again.shift > SHIFTED else None
     alike = [one for one in trials if one.unexplained <= EQUAL * best.unexplained + SAME]
     return Mend(alike[0].change, _words(record, model, declared, alike), True)
@@ -134,8 +137,9 @@ def _misfit(
 def _searched_again(
     best: Trial, record: Record, model: Model, pool: ThreadPoolExecutor | None
 ) -> Trial | None:
-    """The record as it is declared once more, before a change is believed: from the values that the change has led to, as they are
-    and with its factor taken into those that a force is proportional to, and over a shorter stretch."""
+    """Second fit of the record as declared, before a change is accepted. It starts from the values found with the
+    change, with and without its factor in the values to which a force is proportional, and also uses a shorter
+    stretch."""
     if best.fit is None:
         return None
     found = {n: best.fit.model.value(n) for n in model.free}
@@ -164,11 +168,11 @@ def _shift(
     tried: partial[Trial | None],
     pool: ThreadPoolExecutor | None,
 ) -> Mend | None:
-    """The change that leads all values back, where they are shifted as declared and the error is none the larger for it, and no
-    missing physics does that."""
+    """The change that returns all values to the given ones, where they are shifted as declared, the error does not
+    grow, and no missing effect does the same."""
     trials = [one for change in likely_changes(record, model) if (one := tried(change)) is not None]
     back = _back(trials, declared)
-    if not back:  # no unit with a name, such as amperes
+    if not back:  # no named unit, such as amperes
         common = _common_factor(declared.fit, model)
         one = None if common is None else tried(Change("input", 1.0 / common))
         back = [] if one is None else _back([one], declared)
@@ -183,14 +187,14 @@ def _shift(
 
 
 def _back(trials: Sequence[Trial], declared: Trial) -> list[Trial]:
-    """Trials that lead the values back and explain the record as well."""
+    """Trials that return the values to the given ones and explain the record as well."""
     most = EQUAL * declared.unexplained + SAME
     return [one for one in trials if one.shift < BACK and one.unexplained <= most]
 
 
 def _with_more(record: Record, model: Model, pool: ThreadPoolExecutor | None) -> Trial | None:
-    """The record as it is declared, by the model with a dry friction, a constant force and a spring besides; None where it has them
-    already, or the effort along the motion does not tell how large they are about."""
+    """The record as declared, fitted by the model with added dry friction, constant force and spring. None where
+    the model has them already, or where the effort along the motion does not give their approximate size."""
     own = own_model(model, record)
     try:
         balance = Balance.of([record], own)
@@ -215,8 +219,8 @@ def _with_more(record: Record, model: Model, pool: ThreadPoolExecutor | None) ->
 
 
 def _common_factor(fit: Fit | None, given: Model) -> float | None:
-    """The factor by which all values that a force is proportional to are shifted together; None where they are not, or are fewer
-    than two, for a single one that is off is no unit."""
+    """The common factor of all values to which a force is proportional; None where they have none, or are fewer
+    than two, because a single wrong value is not a unit."""
     if fit is None:
         return None
     logs = [
@@ -230,7 +234,7 @@ def _common_factor(fit: Fit | None, given: Model) -> float | None:
 
 
 def gains(model: Model) -> list[str]:
-    """Free values, other than zero, in units of force: all of them scale with the force's unit."""
+    """Free nonzero parameters in units of force: all of them scale with the force's unit."""
     force = model.units.force
     return [
         n
@@ -240,7 +244,7 @@ def gains(model: Model) -> list[str]:
 
 
 def _foreign(tried: partial[Trial | None]) -> Trial | None:
-    """The input under the gain that suits the model best, such as amperes for N m, where that is far from 1."""
+    """The input with the gain that fits the model best, such as amperes for N m, where it is far from 1."""
     found = [
         one
         for gain in GAINS
@@ -261,7 +265,7 @@ def _foreign(tried: partial[Trial | None]) -> Trial | None:
 
 
 def _gain_step(fit: Fit) -> float:
-    """Relative change of the input that the residual asks for, the model's values held: one step of least squares."""
+    """Relative change of the input that the residual calls for with the model's values fixed: one least-squares step."""
     run = fit.run
     one = run.series[0]
     assert one.command is not None
@@ -279,7 +283,8 @@ def _gain_step(fit: Fit) -> float:
 
 
 def _declared(record: Record, model: Model, pool: ThreadPoolExecutor | None) -> Trial:
-    """The record as it is declared, from several delays: a late start of the response must not look like a turned sign."""
+    """The record as declared, fitted from several delays: a late start of the response must not look like a changed
+    sign."""
     best = _tried(AS_DECLARED, record, model, pool) or Trial(AS_DECLARED, math.inf, 0.0)
     label = "input_delay.delay"
     if best.unexplained < POOR_MOTION or best.fit is None or label not in best.fit.names:
@@ -302,7 +307,7 @@ def _tried(
     given: Model | None = None,
     periods: float = STRETCH,
 ) -> Trial | None:
-    """The model refitted to a stretch of the record under a change; None where that cannot be simulated."""
+    """The model refitted to a stretch of the record under a change; None where it cannot be simulated."""
     changed = change.applied(record)
     if changed is None:
         return None
@@ -317,12 +322,12 @@ def _tried(
 
 
 def unexplained(search: Search) -> float:
-    """Share of the motion that a fit leaves, or of the response to the command where that stands out of the noise."""
+    """Unexplained share of the motion, or of the response to the command where that exceeds the noise."""
     return search.motion if search.over_noise < 2.0 else max(search.motion, search.response)
 
 
 def shift(given: Model, fitted: Model) -> float:
-    """Mean |log| of the ratios of a model's free values to those that were given, each within a factor of a million."""
+    """Mean |log| of the ratios of a model's free values to the given ones, each limited to a factor of a million."""
     ratios = []
     for name in given.free:
         value = given.parameters[name]
@@ -334,7 +339,7 @@ def shift(given: Model, fitted: Model) -> float:
 
 
 def _stretch(series: Series, periods: float) -> Series:
-    """The first periods of a series."""
+    """The first `periods` periods of a series."""
     count = int(periods / (dominant_frequency(series) * series.period * series.block)) + 1
     count = min(count, series.blocks)
     samples = count * series.block
@@ -342,7 +347,7 @@ def _stretch(series: Series, periods: float) -> Series:
 
 
 def _words(record: Record, model: Model, declared: Trial, alike: Sequence[Trial]) -> str:
-    """What is likely wrong and how to mend it, in one line."""
+    """The likely wrong declaration and its correction, in one line."""
     best = alike[0]
     said = f"{record.name}: {guess(best.change, record, model)}: {instruction(best.change)}"
     others = [instruction(one.change) for one in alike[1:] if one.change.role != best.change.role][:1]

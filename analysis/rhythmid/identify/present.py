@@ -1,4 +1,4 @@
-"""From an identification to the plain data that its report draws."""
+"""Converts an identification to the plain data of its report."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from rhythmid.report.transfer_figures import TransferFunction
 
 
 def present(found: Identification, command: str = "", name: str = "a model") -> Page:
-    """The report of an identification; `command` is the command line, `name` the model's."""
+    """Report page of an identification; `command` is the command line, `name` the model's."""
     units = found.model.units
     names = ", ".join(record.name for record in found.records)
     return identification_page(
@@ -37,8 +37,8 @@ def present(found: Identification, command: str = "", name: str = "a model") -> 
 
 
 def _runs(found: Identification) -> list[Run]:
-    """Every record beside the identified model's free run, those held out last; by the paper's method, which simulates nothing else,
-    only these."""
+    """Every record beside the identified model's free run, held-out records last. With the paper's method only
+    held-out records are simulated."""
     labels, runs = ("identified model", ""), []
     if found.joint is not None:
         fit = found.joint.fit
@@ -56,9 +56,9 @@ def _held_out(found: Identification) -> tuple[HeldOutRun, ...]:
 
 
 def _transfer(found: Identification) -> list[TransferFunction]:
-    """The estimated functions, with what the identified model would show there.
+    """The estimated functions, with those of the identified model.
 
-    The model's function turns by the identified delays, equation (7) of the paper.
+    The model's function includes the phase of the identified delays, equation (7) of the paper.
     """
     functions, delays = found.shown.functions, found.delays
     if functions is None:
@@ -72,7 +72,7 @@ def _transfer(found: Identification) -> list[TransferFunction]:
     )
     try:
         machine = linearised(without_forcing(found.model), pumping)
-    except InputError:  # a motion without forcing has no cycle to linearise around
+    except InputError:  # without forcing there is no limit cycle to linearise around
         machine = None
     made = []
     for one in functions.functions:

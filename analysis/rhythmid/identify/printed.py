@@ -1,4 +1,4 @@
-"""An identification on the terminal."""
+"""Prints an identification on the terminal."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +11,7 @@ from rhythmid.report.terminal_table import print_estimates
 
 
 def show(result: Mapping[str, Any], console: Console) -> None:
-    """Print an identification as its JSON holds it: what casts doubt on it first."""
+    """Print an identification from its JSON data, cautions first."""
     for warning in result["warnings"]:
         console.print(f"[bold]{escape(warning['text'])}[/]")
         console.print(f"  {escape(warning['question'])}")
@@ -46,7 +46,7 @@ def show(result: Mapping[str, Any], console: Console) -> None:
 
 
 def _show_held_out(held_out: Mapping[str, Any] | None, console: Console) -> None:
-    """The error on held-out records, in all and record by record, or why there is none."""
+    """Print the error on held-out records, in all and record by record, or why there is none."""
     if held_out is None:
         return
     records = held_out["records"]
@@ -58,7 +58,7 @@ def _show_held_out(held_out: Mapping[str, Any] | None, console: Console) -> None
 
 
 def _show_transfer_functions(result: Mapping[str, Any], console: Console) -> None:
-    """The paper's method and what was found of transfer functions, or in one line what they lack."""
+    """Print the results of the paper's method and the transfer functions, or in one line the missing conditions."""
     methods, about = result["methods"], result["transfer_functions"]
     for name, estimates in methods["paper"].items():
         told = ", ".join(f"{which} {1e3 * value:.2f} ms" for which, value in estimates.items())

@@ -1,4 +1,5 @@
-"""Sizes that records show: how far and how fast a machine moves, and what drives it. First guesses of parameters are measured by them."""
+"""Scales of the records: size and speed of the motion, and the driving signals. They scale first guesses of
+parameters."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,11 +15,11 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 REST_LENGTH = "linear_spring.rest_length"
-NO_SPRING = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
+NO_SPRING = 1e-4  # share of the inertia's stiffness m ω² below which a spring sets no scale
 
 
 def scales(series: Sequence[Series], model: Model) -> Scales:
-    """Sizes that the records show, for first guesses of parameters."""
+    """Scales that the records show, for first guesses of parameters."""
     biggest = max(series, key=lambda s: float(np.std(s.averaged)))
     frequency = dominant_frequency(biggest)
     motions = [_motion(one) for one in series]
@@ -29,11 +30,12 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
     stiffness = spring if spring > NO_SPRING * inertial else inertial
     effort, peak, pumping, reference = 0.0, 0.0, 0.0, 0.0
-    # by a forcing or a controller of the model's own
+    # from the model's own forcing or controller
     driven = any(term.element.acts in ("drive", "feedback") for term in model.terms)
-    fed = any(term.element.takes for term in model.terms)  # by a voltage, say: what is recorded is no force
+    # by a voltage, for example: the recorded signal is no force
+    fed = any(term.element.takes for term in model.terms)
     drives = [one.drive for one in series]
-    # windows and records may each be driven at a level of their own
+    # windows and records may each have another level of the driving signal
     levels = [float(total[0]) for one, total in zip(series, drives) if one.kind != "base_displacement"]
     driven = driven or len(set(levels)) > 1
     spread = float(np.std(levels)) if levels else 0.0
@@ -73,15 +75,16 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
 
 
 def _place(series: Series, motion: Array) -> Array:
-    """Position (blocks,) as the model counts it: that of `motion`, or where only the speed is measured from where the model begins."""
+    """Position (blocks,) in the model's coordinates: that of `motion`, or relative to the model's initial position
+    where only the speed is measured."""
     fixed = series.kind == "base_displacement" or series.measured != "velocity"
     return motion if fixed else series.average(displacement(series))
 
 
 def _motion(series: Series) -> tuple[Array, Array]:
-    """Position and velocity that the force elements of the model see, as the measurement tells roughly: (blocks,) each.
+    """Approximate position and velocity (blocks,) each, as the model's force elements see them.
 
-    Relative to the base where that moves; what is not measured is integrated, its mean set to zero.
+    They are relative to a moving base. A quantity that is not measured is integrated, with its mean set to zero.
     """
     step, value = series.period * series.block, series.averaged
     if series.kind == "base_displacement" and series.command is not None and series.measured == "position":

@@ -1,6 +1,6 @@
-"""Noise from repeats: what differs between two periods of the same excitation is not physics.
+"""Noise level from repeats: the difference between two periods of the same excitation is noise.
 
-The only noise estimate that no missing effect can reach. It needs stretches in which command and forcing repeat.
+No missing effect affects this noise estimate. It needs stretches in which command and forcing repeat.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from rhythmid.identify.series import Series
 from rhythmid.simulation.signal import FOR_EVER
 
 Array = NDArray[np.float64]
-ENOUGH_DIFFERENCES = 400  # differences below which a noise level is not worth quoting
+ENOUGH_DIFFERENCES = 400  # least number of differences for a reported noise level
 
 
 def _sampled(series: Series, which: str) -> Array | None:
@@ -24,7 +24,8 @@ def _sampled(series: Series, which: str) -> Array | None:
 
 
 def repeat_length(series: Series) -> int | None:
-    """Smallest number of blocks after which command and forcing repeat for at least half of the series; None if none."""
+    """Smallest number of blocks after which command and forcing repeat for at least half of the series; None where
+    they do not."""
     signals = [
         s
         for s in (_sampled(series, "command"), _sampled(series, "forcing"))
@@ -49,9 +50,9 @@ def repeat_length(series: Series) -> int | None:
 
 
 def noise_from_repeats(series: list[Series], settle: float = 0.4) -> NoiseModel | None:
-    """Noise model from differences between periods, the first `settle` share of each series left to settle.
+    """Noise model from differences between periods; the first `settle` share of each series is left out as transient.
 
-    None where too little repeats.
+    None where too few periods repeat.
     """
     stretches: list[Array] = []
     for one in series:

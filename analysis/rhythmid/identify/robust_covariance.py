@@ -1,10 +1,10 @@
-"""Standard deviations where what a fit leaves is no stationary noise: a delay that wanders, noise that grows with the motion, a small
-effect that the model lacks.
+"""Standard deviations for residuals that are not stationary noise: a varying delay, noise that grows with the
+motion, or a small missing effect.
 
-The Fisher information takes whitened residuals for independent and alike. A residual that keeps its sign along a sensitivity for
-longer than the noise remembers moves an estimate by more than that. The scores of contiguous blocks tell by how much: where
-the residuals are what they are taken for, they scatter as the information says
-(H. White, Econometrica 48 (1980) 817; by blocks: K.-Y. Liang, S. L. Zeger, Biometrika 73 (1986) 13).
+The Fisher information assumes independent, identically distributed whitened residuals. A residual that keeps its
+sign along a sensitivity for longer than the noise's memory moves an estimate by more. The scores of contiguous
+blocks measure this: if the assumption holds, their scatter agrees with the information (H. White, Econometrica 48
+(1980) 817; by blocks: K.-Y. Liang, S. L. Zeger, Biometrika 73 (1986) 13).
 """
 
 from collections.abc import Sequence
@@ -20,36 +20,36 @@ from rhythmid.identify.output_error import Fit
 from rhythmid.identify.student import weights_of
 
 Array = NDArray[np.float64]
-# blocks of all records together: so many that a standard deviation from them is known to a ninth, 1/sqrt(2 BLOCKS), and so few
-# that each outlasts what is not noise
+# blocks of all records together: enough to know a standard deviation to a ninth, 1/sqrt(2 BLOCKS), and so few that
+# each is longer than the correlation of the residuals
 BLOCKS = 40
-# chance that the blocks of white noise scatter by more: what they scatter by less says nothing against the information
+# probability of a larger scatter of blocks of white noise: a smaller scatter is no evidence against the information
 CHANCE = 0.025
 
 
 def widening(columns: Array, residual: Array, records: Sequence[slice], inverse: Array, std: Array) -> Array:
-    """Factors (p,) by which standard deviations have to be larger, 1 where the scores of blocks scatter by no more than chance lets them.
+    """Factors (p,) by which standard deviations must be increased; 1 where the scores of blocks scatter within chance.
 
     Parameters
     ----------
     columns : (n, p) sensitivities of the residual, in units of the noise.
     residual : (n,) in the same units.
-    records : rows of each record, which has its share of the blocks.
-    inverse : (p, p) inverse of the information, `columns` with themselves and what priors add.
-    std : (p,) standard deviations without the blocks.
+    records : rows of each record; each gets its share of the blocks.
+    inverse : (p, p) inverse of the information, from `columns` and priors.
+    std : (p,) standard deviations without the block scores.
     """
-    # by each block: of the estimates, and of their variances where the residual is white
+    # scores of each block for the estimates, and their expected variances for white residuals
     moved, share = [], []
     for rows in records:
         count = max(1, round(BLOCKS * (rows.stop - rows.start) / max(len(residual), 1)))
         for part in np.array_split(np.arange(rows.start, rows.stop), count):
             moved.append((residual[part] @ columns[part]) @ inverse)
             share.append(np.sum((columns[part] @ inverse) ** 2, axis=0))
-    lost = len(inverse)  # with every parameter that is fitted the scores sum to zero once more
+    lost = len(inverse)  # each fitted parameter makes the sum of its scores zero
     if not lost or len(moved) <= lost:
         return np.ones(lost)
     variance = np.sum(np.square(moved), axis=0) * len(moved) / (len(moved) - lost)
-    # a variance may be larger than what can be squared, or nothing where the records say nothing of a parameter
+    # a variance may be too large to square, or infinite where a parameter is not identifiable
     most = np.max(share, axis=0)
     part_of_most = np.divide(share, most, out=np.ones_like(share), where=most > 0.0)
     freedom = np.sum(part_of_most, axis=0) ** 2 / np.sum(np.square(part_of_most), axis=0)
@@ -58,9 +58,10 @@ def widening(columns: Array, residual: Array, records: Sequence[slice], inverse:
 
 
 def with_robust_covariance(fit: Fit) -> Fit:
-    """The fit of a free run with standard deviations that its blocks' scores bear out, and its correlations as they are.
+    """The fit of a free run with standard deviations confirmed by its blocks' scores; correlations are unchanged.
 
-    The information is that of the sensitivities: what else has widened the fit's covariance says nothing of the scores.
+    Only the information of the sensitivities is compared: other terms that have widened the covariance do not
+    affect the scores.
     """
     line = fit.linearisation
     inverse = covariance_of(line.jacobian, [fit.model.parameters[name].prior for name in fit.names])
@@ -75,7 +76,8 @@ def with_robust_covariance(fit: Fit) -> Fit:
 
 
 def with_robust_std(fit: EffortFit, record: NDArray[np.int64]) -> EffortFit:
-    """The fit of an effort with standard deviations that its blocks' scores bear out; `record` (n,) is that of each row."""
+    """The effort fit with standard deviations confirmed by its blocks' scores; `record` (n,) is the record of each
+    row."""
     rows = weighted(fit)
     ends = np.flatnonzero(np.diff(record, append=-1)) + 1
     records = [slice(int(a), int(b)) for a, b in zip((0, *ends[:-1]), ends, strict=True)]
@@ -86,10 +88,10 @@ def with_robust_std(fit: EffortFit, record: NDArray[np.int64]) -> EffortFit:
 
 @dataclass(frozen=True, eq=False)
 class Weighted:
-    """The rows of an effort in units of their noise, as the last step of the fit weighted them.
+    """The rows of an effort fit in units of their noise, with the weights of its last step.
 
-    `inside` (p,) marks the parameters that are estimated, of which `columns` (n, q) are the sensitivities and `inverse` (q, q) the inverse
-    of their information with the priors'; `residual` (n,) is predicted less measured.
+    `inside` (p,) marks the estimated parameters. `columns` (n, q) are their sensitivities, `inverse` (q, q) the
+    inverse of the information including priors. `residual` (n,) is predicted minus measured effort.
     """
 
     inside: NDArray[np.bool_]
@@ -99,7 +101,7 @@ class Weighted:
 
 
 def weighted(fit: EffortFit, correlation: float = 1.0) -> Weighted:
-    """The fit's rows, of which neighbours repeat one another for `correlation` rows."""
+    """The fit's rows, weighted for a correlation of neighbouring rows over `correlation` rows."""
     inside = ~fit.at_limit & (fit.std > 0.0)
     root = root_weights(fit, correlation)
     columns = fit.jacobian[:, inside] * root[:, None]

@@ -15,23 +15,28 @@ from rhythmid.identify.series import record_of
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-# share of a sensitivity, below which what the projection leaves of it is taken for error of the differences: these move the motion by a
-# ten-thousandth, and an angle at rest that the start of a pendulum makes up for leaves up to 1.2e-3 of its effect
+# share of a sensitivity below which its remainder after projection is finite-difference error: differences move the
+# motion by a ten-thousandth, and a pendulum's angle at rest, which the initial state can absorb, leaves up to
+# 1.2e-3 of its effect
 DEAD = 3e-3
-SEEN = 1e-15  # of the motion, below which a difference is rounding; such a step grows to the size of what it is a step of, and not for ever
+# share of the motion below which a difference is rounding error; the step then grows up to the size of its
+# parameter, not further
+SEEN = 1e-15
 
-# times the step of a run, in which its sensitivities are integrated where that is accurate enough
+# ratio of the steps for sensitivities to the step of the run, where that is accurate enough
 COARSER = 4.0
-# of the residual, below which the error of coarser steps has to stay: the directions in which a fit still gains something move the outputs
-# by about the residual
+# largest error of coarser steps as a share of the residual: the directions in which a fit still improves move the
+# outputs by about the residual
 COARSE_ERROR = 0.1
 
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Whitened residual (n,) and its sensitivities to parameters (n, p), both with the initial states projected out;
-    `bases` (one (n_s, q) orthonormal basis a series) span what initial states can do; `steps` (p,) and `state_steps` (q,) are
-    the differences used."""
+    """Whitened residual (n,) and its sensitivities to parameters (n, p), both with the initial states projected out.
+
+    `bases` (one orthonormal basis (n_s, q) per series) span the effects of the initial states. `steps` (p,) and
+    `state_steps` (q,) are the finite-difference steps.
+    """
 
     residual: Array
     jacobian: Array
@@ -63,7 +68,7 @@ class Problem:
         return self.run.series[index].whitened(self.noise, samples, self.stretches[index])
 
     def whitened(self, index: int, samples: Array) -> Array:
-        """Used stretches of series `index`, whitened and joined, what is ignored projected out; (n,) or (n, q)."""
+        """Used stretches of series `index`, whitened and joined, with ignored signals projected out; (n,) or (n, q)."""
         white, ignored = self._white(index, samples), self.ignored[index]
         return white if ignored is None else white - ignored @ (ignored.T @ white)
 
@@ -74,12 +79,13 @@ class Problem:
         return [output - one.averaged for output, one in zip(outputs, self.run.series)]
 
     def learn_hidden(self, model: Model, starts: Sequence[Array]) -> None:
-        """Take the usual values of the elements' own states from a run in which they begin as the motion has them.
+        """Learn the usual range of the elements' own states from a run in which they start as the motion determines them.
 
-        A hidden state hardly differs from a kick to the velocity when its element is fast; knowing its usual range keeps
-        it from wandering off. A run from the starts themselves would take for usual whatever they have wandered off to: from fit to fit
-        a mode of next to no mass would begin further away, until it is a force of its own. All windows of a record share their range,
-        for what rings in one was excited in another. A zero of its own, which never moves in a run, is within the outputs' reach.
+        The effect of a hidden state of a fast element is almost that of a change of the velocity, so the usual
+        range is needed as a prior. A run from the fitted starts would not do: it would accept any start, however
+        far off. From fit to fit, a mode of nearly no mass would start further away and finally act as an
+        independent force. All windows of a record share one range, because an oscillation in one window was excited
+        in another. A zero is constant during a run; its range is that of the outputs.
         """
         if self.run.states == 2:
             self.hidden = [(np.empty(0), np.empty(0)) for _ in starts]
@@ -101,26 +107,26 @@ class Problem:
             self.hidden.append((mean, scatter))
 
     def _usual(self, model: Model, index: int, start: Array, zero: int | None) -> Array:
-        """States of elements (n, h) along series `index`, which begin as the position and velocity of its start have them; as the start
-        has them where the model diverges from there."""
+        """States of elements (n, h) along series `index`, started from the position and velocity of its start.
+        Where the model diverges from there, the element states of the start are kept."""
         begin = start_of(model, self.run, index, float(start[0]), float(start[1]))
         if zero is not None:
             begin[zero] = start[zero]
         rows = self.run.rows(model, index, begin)
         if rows is None:
             rows = self.run.rows(model, index, start)
-        # all of the run: a free decay is at its largest where it begins
+        # the whole run: a free decay is largest at its start
         return np.zeros((1, self.run.states - 2)) if rows is None else rows[:, 2 : self.run.states]
 
     def departure(self, index: int, start: Array) -> Array:
-        """Element states of a start, as multiples of their usual scatter from their usual mean."""
+        """Deviation of a start's element states from their usual mean, in units of their usual scatter, (h,)."""
         mean, scatter = self.hidden[index]
         return (start[2:] - mean) / scatter
 
     def cost(self, model: Model, residuals: Sequence[Array] | None, starts: Sequence[Array]) -> float:
         if residuals is None:
             return math.inf
-        with np.errstate(over="ignore"):  # a run that has all but diverged costs infinitely much
+        with np.errstate(over="ignore"):  # a nearly divergent run has infinite cost
             total = sum(float(np.sum(self.whitened(i, r) ** 2)) for i, r in enumerate(residuals))
         total += sum(float(np.sum(self.departure(i, start) ** 2)) for i, start in enumerate(starts))
         for name in self.names:
@@ -138,7 +144,8 @@ class Problem:
         state_steps: Array,
         columns: Sequence[int],
     ) -> list[list[Array] | None]:
-        """Outputs of a run with parameter or (from p on) initial state of each of the `columns` moved by its step."""
+        """Outputs of a run with the parameter, or from p on the initial state, of each of the `columns` moved by
+        its step."""
         cases: list[tuple[Model, Sequence[Array]]] = []
         for c in columns:
             if c < len(self.names):
@@ -153,7 +160,7 @@ class Problem:
     def _base(
         self, model: Model, starts: Sequence[Array], residuals: Sequence[Array]
     ) -> tuple[FreeRun, list[Array]]:
-        """The run by which sensitivities are taken, and its outputs from which those of `_perturbed` differ."""
+        """The run used for sensitivities, and its outputs as the reference for those of `_perturbed`."""
         own = [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
         if self.coarse.max_step == self.run.max_step:
             return self.run, own
@@ -173,10 +180,10 @@ class Problem:
         state_steps: Array,
         known: Sequence[bool],
     ) -> tuple[Array, Array]:
-        """Difference steps under which every parameter and state moves the outputs by about the same small amount.
+        """Finite-difference steps that move the outputs by about the same small amount for every parameter and state.
 
-        Their natural sizes span many powers of ten (a stiffness, a delay, a hidden state of an actuator). Those that are `known`
-        (p + q) stay as they are.
+        Natural sizes span many powers of ten (a stiffness, a delay, a hidden state of an actuator). Steps marked
+        `known` (p + q) are unchanged.
         """
         run, base = self._base(model, starts, residuals)
         joint = np.concatenate([steps, state_steps])
@@ -202,7 +209,7 @@ class Problem:
         return joint[:p], joint[p:]
 
     def _signed(self, model: Model, steps: Array) -> Array:
-        """Steps that stay within the parameters' bounds."""
+        """Steps with signs that keep the parameters within their bounds."""
         signed = steps.copy()
         for i, name in enumerate(self.names):
             value = model.parameters[name]
@@ -248,7 +255,8 @@ class Problem:
             joined = np.vstack([white, known])
             basis = span(joined[:, 1 + p :])
             projected = joined[:, : 1 + p] - basis @ (basis.T @ joined[:, : 1 + p])
-            # what is left of a parameter that acts as the initial state does, or as what is ignored, is rounding
+            # the remainder of a parameter with the same effect as the initial state or an ignored signal is
+            # rounding error
             whole = np.linalg.norm(self._white(index, change[:, :p]), axis=0)
             projected[:, 1:][:, np.linalg.norm(projected[:, 1:], axis=0) < DEAD * whole] = 0.0
             rows.append(projected[: len(white), 0])
@@ -259,7 +267,7 @@ class Problem:
             place += len(white)
         target = 1e-4 * self.spread
         ratio = np.clip(target / np.maximum(moved, 1e-30), 1e-3, 1e3)
-        # a tick of a clock shows once a step passes it; what does nothing never does
+        # a clock's tick has an effect once a step passes it; a parameter without effect never has
         unseen = moved < SEEN * self.spread
         most = np.append(
             [abs(model.value(name)) or self.spread for name in self.names], np.full(q, self.spread)
@@ -273,7 +281,7 @@ class Problem:
 
 
 def state_update(sensitivity: Array, target: Array, damping: Array | None = None) -> Array:
-    """Least-squares change of a series' initial state (in units of its difference steps), each part of it damped (q,)."""
+    """Least-squares change (q,) of a series' initial state, in units of its difference steps, with damping (q,)."""
     norms, live = _felt(sensitivity)
     change = np.zeros(sensitivity.shape[1])
     if live.any():
@@ -286,7 +294,7 @@ def state_update(sensitivity: Array, target: Array, damping: Array | None = None
 
 
 def span(columns: Array) -> Array:
-    """Orthonormal basis of the columns' span; dependent ones are dropped."""
+    """Orthonormal basis of the columns' span; dependent columns are dropped."""
     norms, live = _felt(columns)
     if not live.any():
         return np.zeros((len(columns), 0))
@@ -295,10 +303,10 @@ def span(columns: Array) -> Array:
 
 
 def _felt(columns: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Norms of the columns, and which are more than rounding.
+    """Norms of the columns, and which of them exceed rounding errors.
 
-    The first two, of position and velocity, set the scale: what keeps a hidden state that never moves in its place outweighs
-    them by any power of ten, and would pass them off for rounding.
+    The first two, of position and velocity, set the scale. The prior of a hidden state that never moves can exceed
+    them by many powers of ten and would make them look like rounding errors.
     """
     norms = np.linalg.norm(columns, axis=0)
     return norms, norms > 1e-9 * max(norms[:2].max(initial=0.0), 1e-300)

@@ -1,7 +1,7 @@
-"""Records made ready for the time domain: continuous inputs, measured samples, and which of them count.
+"""Records prepared for the time domain: continuous inputs, measured samples, and a mask of the samples to use.
 
-Samples are compared in block averages: far above the machine's dynamics there is nothing to learn, and averaging the
-simulation in the same way keeps the comparison unbiased.
+Block averages are compared. Far above the machine's dynamics samples contain no information. The simulation is
+averaged in the same way, which keeps the comparison unbiased.
 """
 
 import math
@@ -25,11 +25,13 @@ from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.generated_source import InputKind, OutputKind
 from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, is_held, is_smooth, spline
 
-ERASED = 0.02  # share of a motion's power that a Hann window leaves (of a steady one 3/8), below which the motion is gone
-LEAST_PART = 16  # samples in which a frequency can still be seen
-TORN = 0.1  # of the blocks with a gap, beyond which stamps are too uneven to average samples; rare gaps cost fewer
-OFTEN = 0.5  # of a block, in which a held command changes: the machine averages what it does not follow
-REACH = 2  # blocks on either side from which `of_block` takes differences
+# share of a motion's power after a Hann window (3/8 for a steady motion) below which the motion has died out
+ERASED = 0.02
+LEAST_PART = 16  # least number of samples for a spectrum
+# share of blocks with a gap above which timestamps are too uneven for averaging; rare gaps cost fewer
+TORN = 0.1
+OFTEN = 0.5  # in blocks: interval of a held command below which the machine averages its steps
+REACH = 2  # blocks on either side used in the differences of `of_block`
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -38,20 +40,20 @@ Mask = NDArray[np.bool_]
 class Series:
     """One record's measurement with its inputs as functions of time.
 
-    `time` (n,) [s] and `value` (n,) are the stamps and samples of the measurement; `block` samples are averaged into
-    one; `used` (n // block,) marks the averages that the fit may see, `hidden` those that are kept from it to be judged by;
-    what is in neither, like a gap, counts for nothing. `period` [s] is the usual sample period.
-    `ignored` (n // block, q) are signals any multiple of which the averages may contain, so that nothing is learnt from
-    them (the limit cycle's harmonics, where the cycle is not to be used).
-    `parameters` are values of the model's parameters that the record declares; see `own_model`. `record` is the record that the
-    series is a stretch of, empty for a whole one. `spread` (n // block,) is the standard deviation of each average's noise over its
-    root mean square, where it is not the same throughout: jitter of the stamps makes it grow with the slope of the signal.
-    `resolution` is the step of the grid that the samples were rounded to, 0 where they lie on none. `colour` is the noise model,
-    where that is known up to its size, as that of what jitter of commands excites.
-    `zero` is what was taken off the samples because the output's zero is not that of the first record, as far as that is known; None
-    where it is; see `record_zero`. `origin` is where the motion begins that the model integrates, which nothing measures: of a stretch of a
-    record of a speed, the displacement since the record began; see `displacement`. `inputs` are command and forcing as the compiled loop
-    takes them, made by itself. `one_clock` is that of `Record`.
+    `time` (n,) [s] and `value` (n,) are the timestamps and samples of the measurement; `block` samples are averaged
+    into one. `used` (n // block,) marks the averages that are fitted, `hidden` those that are held out. Averages in
+    neither, such as gaps, are ignored. `period` [s] is the usual sample period. `ignored` (n // block, q) are
+    signals that are projected out of the averages (the limit cycle's harmonics, where the cycle is not used as
+    data). `parameters` are values of the model's parameters that the record declares; see `own_model`. `record`
+    names the record of which the series is a stretch; it is empty for a whole record. `spread` (n // block,) is the
+    standard deviation of each average's noise relative to its root mean square, where it varies: with timestamp
+    jitter it grows with the slope of the signal. `resolution` is the step to which the samples were rounded, 0
+    where they were not. `colour` is the noise model, where its spectrum is known, such as that of the effect of
+    command jitter. `zero` is the current estimate of the zero that was subtracted from the samples, relative to the
+    first record; None where the zero is that of the first record; see `record_zero`. `origin` is the unmeasured
+    start of the motion that the model integrates: for a stretch of a speed record, the displacement since the
+    record began; see `displacement`. `inputs` are command and forcing in the form of the compiled loop, created
+    automatically. `one_clock` is that of `Record`.
     """
 
     name: str
@@ -77,7 +79,7 @@ class Series:
     inputs: Inputs = field(default=Inputs(None, None), repr=False)
 
     def __post_init__(self) -> None:
-        """Keep the inputs of the series that this one was made from, where the signals are the same."""
+        """Reuse the inputs of the series from which this one was made, where the signals are the same."""
         if self.inputs.commanded is not self.command or self.inputs.forced is not self.forcing:
             object.__setattr__(self, "inputs", Inputs(self.command, self.forcing))
 
@@ -88,22 +90,22 @@ class Series:
 
     @cached_property
     def commanded(self) -> bool:
-        """Whether the command changes while the series lasts: one that is constant drives nothing."""
+        """Whether the command changes during the series: a constant command is no excitation."""
         return bool(np.ptp(self._told(self.command)) > 0.0)
 
     @cached_property
     def driven(self) -> bool:
-        """Whether command or forcing change while the series lasts."""
+        """Whether command or forcing change during the series."""
         return self.commanded or bool(np.ptp(self._told(self.forcing)) > 0.0)
 
     @property
     def drive(self) -> Array:
-        """Command and forcing together at the samples (n,)."""
+        """Sum of command and forcing at the samples (n,)."""
         return self._told(self.command) + self._told(self.forcing)
 
     def _told(self, signal: PPoly | None) -> Array:
-        """Values (n,) of a signal at the samples, continued as `pieces` does; one that begins within a sample period of the record
-        began with it, and makes no step there."""
+        """Values (n,) of a signal at the samples, continued as `pieces` does. A signal that starts within one
+        sample period of the record's start is taken to start with it, without a step."""
         if signal is None:
             return np.zeros(len(self.time))
         told = signal(np.clip(self.time, signal.x[0], min(signal.x[-1], FOR_EVER)))
@@ -116,15 +118,16 @@ class Series:
 
     @cached_property
     def centres(self) -> Array:
-        """Middle of each block [s]: where the simulation is evaluated."""
+        """Times of the block centres [s], at which the simulation is evaluated."""
         return self.average(self.time)
 
     def of_block(self, samples: Array) -> Array:
         """Block averages (n,) of a smooth signal from its values at the blocks' centres, by central differences.
 
-        The average over b samples is a sum D = 1 + a δ² + c δ⁴ + … of differences between neighbouring blocks, exact to the
-        fourth order in frequency; at the ends the differences are extrapolated. Where samples are missing, δ² is the divided
-        difference over the times that there are, and a the spread of those times about their mean.
+        The average over b samples is a sum D = 1 + a δ² + c δ⁴ + … of differences between neighbouring blocks,
+        exact to the fourth order in frequency. At the ends the differences are extrapolated. Where samples are
+        missing, δ² is the divided difference over the existing sample times, and a is the spread of those times
+        about their mean.
         """
         if self.block == 1 or len(samples) < 8:
             return samples
@@ -141,7 +144,7 @@ class Series:
 
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
-        """What δ² takes of the step before a block and of the one after it; both 1 where no sample is missing."""
+        """Weights in δ² of the differences to the previous and to the next block; both 1 where no sample is missing."""
         apart = np.diff(self.centres) / (self.block * self.period)
         around = 0.5 * (apart[1:] + apart[:-1])
         return 1.0 / (around * apart[:-1]), 1.0 / (around * apart[1:])
@@ -155,8 +158,11 @@ class Series:
 
     @property
     def smooth(self) -> Pieces | None:
-        """A smooth command, or the smooth surrogate for one that is held and changes, at even times, several times in a block, or about
-        as often as the measurement is sampled where samples are averaged; None where there is none."""
+        """The command if it is smooth, or the smooth surrogate of a held one; None where there is none.
+
+        A surrogate is used for a command that is held at even intervals and changes several times in a block, or about as
+        often as the measurement is sampled where samples are averaged.
+        """
         if self.command is None or not is_held(self.command):
             return None if self.command is None or not is_smooth(self.command) else self.inputs.command
         often = max(2.0 * self.period if self.block > 1 else 0.0, OFTEN * self.block * self.period)
@@ -168,24 +174,24 @@ class Series:
         return self.average(self.value)
 
     def counted(self, hidden: bool = False) -> Mask:
-        """The averages (n // block,) that the fit sees, or those hidden from it."""
+        """Mask (n // block,) of the fitted averages, or of the held-out ones."""
         if not hidden:
             return self.used
         return np.zeros(self.blocks, bool) if self.hidden is None else self.hidden
 
     def spread_of(self, part: slice) -> Array:
-        """Relative standard deviation of the noise of the averages `part`, (m,)."""
+        """Relative standard deviation (m,) of the noise of the averages `part`."""
         return np.ones(self.blocks)[part] if self.spread is None else self.spread[part]
 
     def levelled(self, samples: Array, part: slice = slice(None)) -> Array:
-        """Samples of the averages `part`, (m,) or (m, q), over the relative standard deviation of their noise: what is whitened
-        and weighed. The samples themselves where the noise is the same throughout."""
+        """Samples of the averages `part`, (m,) or (m, q), divided by the relative standard deviation of their
+        noise, for whitening and weighting; unchanged where the noise is uniform."""
         if self.spread is None:
             return samples
         return samples / self.spread[part].reshape(-1, *[1] * (samples.ndim - 1))
 
     def stretches(self, noise: NoiseModel, hidden: bool = False) -> tuple[slice, ...]:
-        """Stretches of the averages that the fit sees, or of those hidden from it, that are long enough to be whitened."""
+        """Stretches of the fitted averages, or of the held-out ones, that are long enough for whitening."""
         return tuple(s for s in runs(self.counted(hidden)) if s.stop - s.start > noise.order + 1)
 
     def whitened(self, noise: NoiseModel, samples: Array, parts: Sequence[slice]) -> Array:
@@ -194,12 +200,13 @@ class Series:
         return np.concatenate(white) if white else samples[:0]
 
     def power(self, chosen: Mask) -> float:
-        """Sum of squares of the motion that errors of the chosen averages are a share of; see `motion_power`."""
+        """Sum of squares of the motion over the chosen averages, as the reference for relative errors; see
+        `motion_power`."""
         return motion_power(self.averaged, chosen)
 
 
 def _extended(samples: Array, count: int) -> Array:
-    """Samples with `count` more at either end, on the cubic through the last four there."""
+    """Samples extended by `count` at either end, with the cubic through the last four samples there."""
     for _ in range(count):
         first = (
             4.0 * samples[0] - 6.0 * samples[1] + 4.0 * samples[2] - samples[3]
@@ -216,10 +223,10 @@ def _extended(samples: Array, count: int) -> Array:
 
 
 def moving_part(value: Array) -> Array:
-    """The samples (n,) without an end in which hardly anything moves any more.
+    """The samples (n,) without a final part in which hardly anything moves.
 
-    A Hann window over the whole of a motion that dies out at once would leave nothing of it. The samples are halved until the
-    window leaves some of its power.
+    A Hann window over a motion that dies out at once would leave almost none of it. The samples are halved until
+    the window leaves some of the motion's power.
     """
     while len(value) >= 2 * LEAST_PART:
         motion = value - value[len(value) // 2 :].mean()
@@ -231,13 +238,13 @@ def moving_part(value: Array) -> Array:
 
 
 def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
-    """Frequency [Hz] below which `share` of the motion's power lies (its mean and trend left out)."""
+    """Frequency [Hz] below which `share` of the motion's power lies, without mean and trend."""
     value = moving_part(value)
     n = len(value)
     detrended = value - np.linspace(value[: max(1, n // 50)].mean(), value[-max(1, n // 50) :].mean(), n)
     length = fast_length(n)
     power = np.abs(np.fft.rfft(detrended * np.hanning(n), length)) ** 2
-    floor = np.median(power[len(power) // 2 :])  # measurement noise, as the upper half of the band shows it
+    floor = np.median(power[len(power) // 2 :])  # measurement noise, from the upper half of the band
     # the power of noise at a frequency is distributed exponentially: the largest of n values is about log2(n) times their median
     power = np.maximum(power - math.log2(len(power)) * floor, 0.0)
     total = np.cumsum(power)
@@ -247,7 +254,7 @@ def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
 
 
 def block_length(value: Array, period: float) -> int:
-    """Samples to average: as many as still leave sixteen averages in the fastest period that carries power."""
+    """Number of samples to average: at least sixteen averages remain in the shortest period with power."""
     return int(np.clip(np.floor(1.0 / (16.0 * bandwidth(value, period) * period)), 1, 10))
 
 
@@ -257,7 +264,7 @@ def _spline_of(time: Array, value: Array) -> PPoly:
 
 
 def _held_before(time: Array, value: Array) -> tuple[Array, Array]:
-    """A reference that held its first value before the record, too: the machine was there already."""
+    """A reference with its first value held before the record, because the machine was already there."""
     step = nominal_period(np.diff(time))
     count = int(np.clip(np.ceil(1.0 / step), 1, 10_000))
     earlier = time[0] + step * np.arange(-count, 0)
@@ -266,9 +273,9 @@ def _held_before(time: Array, value: Array) -> tuple[Array, Array]:
 
 def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]:
     """Series of all records. With `block` None the averaging is chosen from the records' bandwidth; samples with uneven
-    stamps are not averaged.
+    timestamps are not averaged.
 
-    Raises InputError for a record too short to say anything, or with values that are not finite.
+    Raises InputError for a record that is too short, or with values that are not finite.
     """
     made: list[Series] = []
     for record in records:
@@ -323,7 +330,7 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
 
 
 def record_of(series: Series) -> str:
-    """Name of the record that a series is, or is a stretch of."""
+    """Name of the record to which a series belongs."""
     return series.record or series.name
 
 
@@ -349,7 +356,7 @@ def _check(record: Record) -> None:
 
 
 def _whole_blocks(series: Series, block: int) -> Mask:
-    """Blocks that no gap runs through, nor past their neighbours, whose differences `of_block` takes."""
+    """Blocks without a gap in themselves or in the neighbours whose differences `of_block` uses."""
     n = len(series.time) // block
     if block == 1:
         return np.ones(n, bool)
@@ -363,12 +370,12 @@ def _whole_blocks(series: Series, block: int) -> Mask:
 
 
 def displacement(series: Series) -> Array:
-    """Position (n,) at the samples of a series whose speed is measured, its beginning taken for `origin`."""
+    """Position (n,) at the samples of a series whose speed is measured, starting at `origin`."""
     return series.origin + cumulative_trapezoid(series.value, series.time, initial=0.0)
 
 
 def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Series], list[Series]]:
-    """Each series with its last part hidden from the fit, and the same with only that part to be judged."""
+    """Each series with its last part held out, and the same series with only that part to be scored."""
     seen, unseen = [], []
     for one in series:
         last = np.arange(one.blocks) >= round((1.0 - share) * one.blocks)
@@ -378,7 +385,7 @@ def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Se
 
 
 def dominant_frequency(series: Series, finer: int = 1) -> float:
-    """Frequency [Hz] of the strongest line of the motion, on a grid that is so many times finer than the record resolves."""
+    """Frequency [Hz] of the strongest line of the motion, on a grid `finer` times as fine as the record's resolution."""
     value = moving_part(series.averaged)
     value = value - value.mean()
     length = fast_length(finer * len(value))

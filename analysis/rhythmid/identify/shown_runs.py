@@ -1,4 +1,4 @@
-"""Free runs of fitted models beside the records, as reports draw them."""
+"""Free runs of fitted models beside the records, for reports."""
 
 from collections.abc import Mapping
 
@@ -21,10 +21,10 @@ def free_runs(
     labels: tuple[str, str],
     heldout: bool = False,
 ) -> list[Run]:
-    """Every series of the fits beside its simulations; they were fitted to the same series.
+    """Every series of the fits beside its simulations; both fits use the same series.
 
-    `pumpings` are those of the records, by name, whole or cut into windows. Where nothing was `repaired` only `before` is
-    shown, with the motion of `after`, which may be the same.
+    `pumpings` are those of the records, by name, whole or cut into windows. Where nothing was `repaired`, only
+    `before` is shown, with the motion of `after`, which may be the same.
     """
     found: list[Run] = []
     for index, one in enumerate(before.run.series):
@@ -58,7 +58,7 @@ def free_runs(
 
 
 def _hidden(one: Series) -> NDArray[np.bool_]:
-    """The end of a series that was kept from the fit; single blocks that a gap runs through are not meant."""
+    """The held-out end of a series, without single blocks that contain a gap."""
     last = np.flatnonzero(one.used)
     hidden = np.zeros_like(one.used)
     if len(last):

@@ -1,4 +1,4 @@
-"""Where the noise is larger: the relative standard deviation of block averages under the jitter of their stamps."""
+"""Nonuniform noise: relative standard deviation of block averages under timestamp jitter."""
 
 from collections.abc import Sequence
 
@@ -11,10 +11,11 @@ Array = NDArray[np.float64]
 
 
 def relative_spreads(stretches: Sequence[tuple[str, Array, Array]], block: int) -> list[Array | None]:
-    """Standard deviation of the noise of each average over `block` samples, (n // block,) of each stretch, over its root mean square.
+    """Standard deviation of the noise of each average over `block` samples, relative to its root mean square; (n //
+    block,) per stretch.
 
-    A stretch is the name of its record, its stamps (n,) [s] and its samples (n,); jitter is that of all stretches of a record.
-    None where no jitter shows, so that all averages count alike.
+    A stretch is the name of its record, its timestamps (n,) [s] and its samples (n,). The jitter is estimated from
+    all stretches of a record. None where no jitter is detected, so that all averages have equal weight.
     """
     jitter = {
         name: stamp_jitter([(time, value) for whole, time, value in stretches if whole == name])

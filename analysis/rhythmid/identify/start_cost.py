@@ -1,8 +1,9 @@
-"""What it costs a model that the elements' own states start where they like.
+"""Cost of free initial values of the elements' own states in the comparison of models.
 
-Every series, and in multiple shooting every window, gives a state of an element a start of its own. An element with states gains
-by that alone, about one of chi2 a start, whatever its physics; over hundreds of windows that is more than what a faint effect
-is worth. A fair criterion takes the average over the starts' usual range, not the best of it.
+In every series, and in multiple shooting in every window, the initial state of an element is fitted. An element
+with states gains about one of chi2 per initial state by that alone, whatever its law. Over hundreds of windows that
+exceeds the gain of a small effect. A fair criterion averages the likelihood over the usual range of the starts
+instead of taking its maximum.
 """
 
 from collections.abc import Sequence
@@ -21,12 +22,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FeltStart:
-    """How the h states of elements of one series start.
+    """Initial values of the h element states of one series.
 
     Parameters
     ----------
-    departure : (h,) of the start from the states' usual mean, in units of their usual scatter.
-    sensitivity : (n, h) of the whitened output to it, less what position and velocity at the start can do.
+    departure : (h,) deviation of the start from the states' usual mean, in units of their usual scatter.
+    sensitivity : (n, h) of the whitened output to it, with the effects of initial position and velocity projected out.
     """
 
     departure: Array
@@ -41,9 +42,9 @@ def felt_starts(
     residuals: Sequence[Array],
     state_steps: Array,
 ) -> list[FeltStart]:
-    """The starts of each series; none where elements have no states.
+    """The starts of each series; empty where elements have no states.
 
-    `state_steps` (2 + h,) are the differences by which sensitivities are taken.
+    `state_steps` (2 + h,) are the finite-difference steps for the sensitivities.
     """
     if run.states == 2:
         return []
@@ -60,7 +61,7 @@ def felt_starts(
 
 
 def start_cost(starts: Sequence[FeltStart]) -> float:
-    """Minus twice the logarithm of what remains of the likelihood, averaged over the starts of the elements' states.
+    """Minus twice the logarithm of the ratio of the likelihood averaged over the element states' starts to its maximum.
 
     In Laplace's approximation (D. J. C. MacKay, Neural Computation 4 (1992) 415) d'd + ln det(I + H'H) for each series, with its
     departure d and sensitivity H. Zero without such states.
@@ -73,10 +74,10 @@ def start_cost(starts: Sequence[FeltStart]) -> float:
 
 
 def start_freedom(starts: Sequence[FeltStart]) -> float:
-    """Effective number of parameters that the starts of the elements' states are: tr H'H (I + H'H)^-1 of all series.
+    """Effective number of parameters of the element states' starts: tr H'H (I + H'H)^-1 over all series.
 
-    By as much does a log density that was reached with the starts fitted exceed, on average, what is left on other data
-    (D. J. Spiegelhalter et al., J. R. Stat. Soc. B 64 (2002) 583).
+    On average, the log density with fitted starts exceeds that on other data by this number (D. J. Spiegelhalter et
+    al., J. R. Stat. Soc. B 64 (2002) 583).
     """
     total = 0.0
     for one in starts:

@@ -1,6 +1,6 @@
-"""Where each series' memories (of play, of a limit of rate) start, sought over their whole range.
+"""Search over the whole range for the initial memory states of each series (of backlash, of a rate limit).
 
-A start outside the play's gap, or where the input is, moves nothing: its sensitivity vanishes, and a descent cannot leave it.
+The sensitivity to a start outside the backlash gap, or at the input, is zero, so a descent cannot leave it.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from rhythmid.identify.sensitivity import Problem, state_update
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-SHARES = np.linspace(-1.0, 1.0, 13)  # of the usual range
+SHARES = np.linspace(-1.0, 1.0, 13)  # shares of the usual range
 
 
 def sought(
@@ -22,7 +22,8 @@ def sought(
     states: Sequence[tuple[Array, Array, Array]],
     state_steps: Array,
 ) -> list[Array]:
-    """For each series the best start among its own and those with another memory, the other states solved for anew.
+    """For each series the best start among its own and those with other memory states; the other states are solved
+    for again.
 
     `states` are the series' whitened residuals and sensitivities, as `Problem.linearise` returns them.
     """

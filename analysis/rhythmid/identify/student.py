@@ -1,7 +1,7 @@
-"""Student's t errors: scale, density, weights of reweighted least squares, and how long a residual remembers.
+"""Student's t errors: scale, density, weights of reweighted least squares, and autocorrelation time of residuals.
 
-Rare outliers, and what no model explains, weigh little (K. L. Lange, R. J. A. Little, J. M. G. Taylor, J. Am. Stat. Assoc. 84
-(1989) 881).
+Outliers and effects that no model explains get small weights (K. L. Lange, R. J. A. Little, J. M. G. Taylor, J. Am.
+Stat. Assoc. 84 (1989) 881).
 """
 
 import math
@@ -12,20 +12,20 @@ from scipy.special import gammaln
 
 Array = NDArray[np.float64]
 DEGREES = 4.0  # degrees of freedom: the lowest for which the fourth moment is not finite; Lange et al. use 4 where it is not estimated
-SETTLES = 20  # passes for the scale at most
-HARDLY = 1e-9  # of the root mean square, below which a median says only that most errors are none
-NO_ERROR = 1e-150  # scale where there is no error: its square is a number still
-MEDIAN = 0.741  # of |t| for 4 degrees of freedom and unit scale
+SETTLES = 20  # largest number of iterations for the scale
+HARDLY = 1e-9  # share of the root mean square below which a median only says that most errors are zero
+NO_ERROR = 1e-150  # scale where all errors are zero: its square is still a nonzero number
+MEDIAN = 0.741  # median of |t| for 4 degrees of freedom and unit scale
 
 
 def scale_of(error: Array) -> float:
-    """Maximum-likelihood scale of errors (n,); `NO_ERROR` where there is none."""
+    """Maximum-likelihood scale of errors (n,); `NO_ERROR` where all are zero."""
     square = error**2
     rms = float(np.sqrt(np.mean(square)))
     if rms < NO_ERROR:
         return NO_ERROR
     scale = float(np.median(np.abs(error)) / MEDIAN)
-    if scale < HARDLY * rms:  # most of the errors are none: the others have a scale
+    if scale < HARDLY * rms:  # most errors are zero: use the scale of the others
         scale = rms
     for _ in range(SETTLES):
         new = math.sqrt(float(np.mean((DEGREES + 1.0) * square / (DEGREES + square / scale**2))))
@@ -48,14 +48,14 @@ def log_density(error: Array, scale: float) -> Array:
 
 
 def cost_of(error: Array, scale: float) -> float:
-    """Negative log likelihood of errors (n,) at this scale, but for a constant."""
+    """Negative log likelihood of errors (n,) at this scale, up to a constant."""
     return len(error) * math.log(scale) + 0.5 * (DEGREES + 1.0) * float(
         np.sum(np.log1p((error / scale) ** 2 / DEGREES))
     )
 
 
 def autocorrelation_time(error: Array, record: NDArray[np.int64]) -> float:
-    """Integrated autocorrelation time [rows] of errors (n,) in the records that the rows belong to (n,), at least 1.
+    """Integrated autocorrelation time [rows] of errors (n,), at least 1; `record` (n,) is the record of each row.
 
     Neighbouring autocorrelations are summed while their sum is positive and falls (C. J. Geyer, Statistical Science 7 (1992) 473).
     """

@@ -1,4 +1,4 @@
-"""Between which frequencies a free motion swings: where its law is not linear, they change with the amplitude as it decays."""
+"""Range of frequencies of a free oscillation: with a nonlinear law they change with the amplitude as it decays."""
 
 from collections.abc import Sequence
 
@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from rhythmid.identify.series import Series, moving_part
 
 Array = NDArray[np.float64]
-LEAST_SWING_SHARE = (
-    0.1  # of the largest swing, below which swings are not looked at: noise crosses zero as it likes
-)
-OUTER = (0.05, 0.95)  # quantiles of the frequencies of all swings, beyond which they are taken for errors
+# share of the largest amplitude below which cycles are ignored: noise causes random zero crossings
+LEAST_SWING_SHARE = 0.1
+OUTER = (0.05, 0.95)  # quantiles of the frequencies of all cycles outside which they are taken for errors
 
 
 def swing_frequencies(series: Sequence[Series]) -> tuple[float, float]:
-    """Lowest and highest frequency [Hz] of the swings of these series, from zero to zero in the same direction; (0, 0) without any."""
+    """Lowest and highest frequency [Hz] of the cycles of these series, between zero crossings in one direction; (0,
+    0) without any."""
     found = np.concatenate([_of_one(moving_part(one.averaged), one.period * one.block) for one in series])
     if not len(found):
         return 0.0, 0.0
@@ -24,7 +24,7 @@ def swing_frequencies(series: Sequence[Series]) -> tuple[float, float]:
 
 
 def _of_one(value: Array, step: float) -> Array:
-    """Frequencies [Hz] (n,) of the large swings of a signal with samples `step` [s] apart."""
+    """Frequencies [Hz] (n,) of the cycles of large amplitude of a signal with samples `step` [s] apart."""
     value = value - value.mean()
     before = np.flatnonzero((value[:-1] < 0.0) & (value[1:] >= 0.0))
     if len(before) < 2:

@@ -1,4 +1,4 @@
-"""Where a model's forces change form."""
+"""Positions and velocities at which a model's forces switch."""
 
 from rhythmid.elements.element import Element
 from rhythmid.model import Model, Term

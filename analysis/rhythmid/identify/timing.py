@@ -1,8 +1,8 @@
-"""Timing as it is on robots: clocks that drift apart, delays that drift, jitter, commands held at a slower rate.
+"""Timing errors of robots: clock drift, delay drift, jitter, commands held at a slower rate.
 
-Drifts and holds bias the delays, so they are looked for after every fit, and where one shows it becomes part of the
-model. Jitter hardly biases anything: it is read off what the fit leaves. Lost samples and unequal rates need nothing of
-this: simulation and measurement are compared at the stamps that there are.
+Drifts and holds bias the delays. So they are tested after every fit, and a significant one becomes part of the
+model. Jitter causes hardly any bias; it is estimated from the residuals. Lost samples and unequal rates need no
+correction, because simulation and measurement are compared at the actual timestamps.
 """
 
 import math
@@ -30,27 +30,26 @@ from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 DRIFTS = ("clock_skew", "input_delay_drift")
-EVIDENT_BY = 5.0  # standard deviations from which a timing effect becomes part of the model
-SMEARS = 3  # widths of command jitter that are tried
-ROLL_OFF_SAMPLES = (
-    1_000_000  # samples that tell of a roll-off what there is to be told: further records are not asked
-)
-LEAST_VARIANCE = (
-    0.05  # of the mean square of the residuals, at least expected of each: no single sample decides
-)
-TINY = 1e-300  # in the place of a mean square of zero
-EVEN_SPEED = 1e-12  # variance of squares of speed of mean one, which is rounding: those of a motion differ by one and more
-UNEXPLAINED = 1.5  # times the noise floor, beyond which a hold is looked for
-HOLD_GAIN = 25.0  # in chi2 that a hold must bring
-SLOWER = 3.0  # sample periods from which a hold can be told from the commands' own
-LONGEST_HOLD = 0.25  # seconds between two commands that the drive takes
-REACH = 0.05  # share of a rough period around it in which the true one is looked for, at least
-FINEST = 200  # periods that are tried in there, at most
-REFITTED = 5  # of them, the best
+EVIDENT_BY = 5.0  # standard deviations above which a timing effect becomes part of the model
+SMEARS = 3  # number of widths of command jitter that are tried
+ROLL_OFF_SAMPLES = 1_000_000  # samples that are enough to estimate a roll-off: further records are not used
+# least expected square of each residual, as a share of their mean square: no single sample decides
+LEAST_VARIANCE = 0.05
+TINY = 1e-300  # replaces a mean square of zero
+# variance of squared speed (of mean one) that is rounding error: for a real motion it is one or more
+EVEN_SPEED = 1e-12
+UNEXPLAINED = 1.5  # ratio to the noise floor above which a hold is searched
+HOLD_GAIN = 25.0  # least decrease of chi2 by a hold
+# least period of a hold, in sample periods, that can be distinguished from the commands' own hold
+SLOWER = 3.0
+LONGEST_HOLD = 0.25  # [s] longest interval between two commands that the drive takes
+REACH = 0.05  # least share of a rough period searched on either side of it
+FINEST = 200  # largest number of periods tried there
+REFITTED = 5  # number of the best of them that are refitted
 
 
 def drift_score(fit: Fit, element: str) -> tuple[float, float]:
-    """One-step estimate of a drift and its standard deviation, everything else refitted along (a score test).
+    """One-step estimate of a drift and its standard deviation, with all other parameters refitted (a score test).
 
     C. R. Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50.
     """
@@ -82,16 +81,16 @@ def drift_score(fit: Fit, element: str) -> tuple[float, float]:
 
 
 def _possible_drifts(series: Sequence[Series]) -> tuple[str, ...]:
-    """The drifts that records could show: none where nothing drives the machine, whose own pace is then the only one, and none between
-    the clocks of channels that have one clock."""
+    """Drifts that the records could show. There is none without excitation, where the machine's own pace is the
+    only one, and no clock drift between channels of one clock."""
     if not any(one.driven for one in series):
         return ()
     return tuple(name for name in DRIFTS if name != "clock_skew" or not any(one.one_clock for one in series))
 
 
 def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tuple[JointFit, tuple[str, ...]]:
-    """The fit with every drift of clock or delay that shows made part of the model, or a command held at a slower rate;
-    and what was found, in words."""
+    """The fit with every significant drift of clock or delay, or a hold at a slower rate, as part of the model; and
+    messages about them."""
     fit, notes = joint.fit, []
     catalogue = load_catalogue()
     possible = _possible_drifts(fit.run.series)
@@ -110,7 +109,7 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
         extended = fit.model.with_element(catalogue[name], {catalogue[name].size: scores[name][0]})
         fit = estimate(extended, fit.run.series, pool=pool, max_step=fit.run.max_step)
         parameter = f"{name}.{catalogue[name].size}"
-        # as the blocks' scores bear it out: what the model lacks leads a drift further astray than noise does
+        # with standard deviations confirmed by the blocks' scores: missing effects shift a drift more than noise does
         value, std = fit.model.value(parameter), with_robust_covariance(fit).std[parameter]
         small = abs(value) * max(float(np.ptp(one.time)) for one in fit.run.series) < 1e-6
         if abs(value) < EVIDENT_BY * std or small or fit.noise.variance > before.noise.variance:
@@ -139,7 +138,7 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
 
 
 def _simulated(fit: Fit, index: int) -> tuple[Array, Array]:
-    """Noise-free output and its rate at every sample of series `index`, (n,) each."""
+    """Noise-free output (n,) and its rate (n,) at every sample of series `index`."""
     one = fit.run.series[index]
     rows = fit.run.rows(fit.model, index, fit.starts[index])
     if rows is None:
@@ -150,10 +149,10 @@ def _simulated(fit: Fit, index: int) -> tuple[Array, Array]:
 
 
 def measurement_jitter(fit: Fit) -> Estimate:
-    """Standard deviation σ [s] of the age of single measurements, from residuals that grow with speed.
+    """Standard deviation σ [s] of the jitter of single measurements, from residuals that grow with speed.
 
     Residual variance is σ_n² + σ² v²: a weighted straight line in v² (T. M. Souders et al., IEEE TIM 39(1), 1990). The
-    mean of the jitter is part of the measurement delay. A signal whose speed is always the same determines no such line.
+    mean of the jitter is part of the measurement delay. With constant speed the line is not determined.
     """
     square, speed = [], []
     for index, one in enumerate(fit.run.series):
@@ -165,7 +164,7 @@ def measurement_jitter(fit: Fit) -> Estimate:
         square.append(left[inside] ** 2)
         speed.append(rate[inside] ** 2)
     y, x = np.concatenate(square), np.concatenate(speed)
-    del square, speed  # of a long recording there is no room for a second copy
+    del square, speed  # a long recording leaves no room for a second copy
     per_speed, size = max(float(x.mean()), TINY), max(float(y.mean()), TINY)
     x /= per_speed
     y /= size
@@ -212,7 +211,7 @@ def smeared(command: PPoly, width: float, period: float) -> PPoly:
 
 
 def _received(fit: Fit, width: float) -> tuple[Fit, list[Series]]:
-    """The fit with a delay that is shorter by half of `width` [s], and its series, whose commands are smeared over it."""
+    """The fit with a delay shorter by half of `width` [s], and its series with commands averaged over `width`."""
     step = fit.run.series[0].period
     series = [
         one if one.command is None else replace(one, command=smeared(one.command, width, step))
@@ -223,7 +222,7 @@ def _received(fit: Fit, width: float) -> tuple[Fit, list[Series]]:
 
 
 def _first_samples(fit: Fit, enough: int) -> Fit:
-    """The fit as it stands on its first series, with `enough` samples or more; all of it where there are not so many."""
+    """The fit for its first series, with at least `enough` samples; all of it where there are fewer."""
     ends = np.cumsum([len(one.time) for one in fit.run.series])
     count = int(np.searchsorted(ends, enough)) + 1
     if count >= len(ends):
@@ -233,9 +232,9 @@ def _first_samples(fit: Fit, enough: int) -> Fit:
 
 
 def _smear(fit: Fit, largest: float, pool: ThreadPoolExecutor | None) -> tuple[float, float] | None:
-    """Variance [s²] of a delay that is uniform over an interval and smears the command; and its standard deviation.
+    """Variance [s²] of a delay that is uniform over an interval and so smooths the command; and its standard deviation.
 
-    The profile likelihood over the variance is a parabola. None where the response does not roll off at all.
+    The profile likelihood over the variance is approximated by a parabola. None where the response does not roll off.
     """
     fit = _first_samples(fit, ROLL_OFF_SAMPLES)
     at = np.linspace(0.0, largest, SMEARS + 1) ** 2
@@ -255,7 +254,7 @@ def _smear(fit: Fit, largest: float, pool: ThreadPoolExecutor | None) -> tuple[f
 
 
 def _widened(fit: Fit, name: str, std: float) -> Fit:
-    """The fit with a further independent error of `name` in its covariance."""
+    """The fit with a further independent error of `name` added to its covariance."""
     index = fit.names.index(name)
     covariance = fit.covariance.copy()
     if not math.isfinite(covariance[index, index]):
@@ -265,12 +264,12 @@ def _widened(fit: Fit, name: str, std: float) -> Fit:
 
 
 def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tuple[JointFit, Estimate]:
-    """Look for a drive that takes commands at a slower rate of its own: the fit with it, and its period P [s] or None.
+    """Search for a drive that takes commands at a slower rate of its own: the fit with it, and its period P [s] or None.
 
-    On average over its ticks a held command is smeared over P: the roll-off tells P, and half of it belongs to the hold
-    and not to the delay. Where the machine feels single ticks, only a period that stays in step over the whole record fits
-    (an element with a clock of its own); such periods are tried as finely as that takes, the usual rates among them. Each step must
-    lower chi2 by more than 25.
+    Averaged over the ticks, the drive smooths a held command over P. The roll-off determines P, and half of P is
+    delay of the hold. Where the machine responds to single ticks, only a period that stays in step over the whole
+    record fits (an element with an independent clock). Such periods are tried on a sufficiently fine grid, the
+    usual rates included. Each step must lower chi2 by more than 25.
     """
     fit, name = joint.fit, INPUT_DELAY
     none = Estimate(None, None, "s")
@@ -287,10 +286,10 @@ def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tup
     spread = 6.0 * smear[1] / rough
     best, period = _refitted(*_received(fit, rough), pool), Estimate(rough, spread, "s")
     width = rough
-    early = best.model.value(name) < -step  # what rolls off without being late was not held
+    early = best.model.value(name) < -step  # a roll-off without a delay is no hold
     if best.chi2 > fit.chi2 - HOLD_GAIN or early:
         return joint, none
-    own = step / math.sqrt(12.0)  # a tick cannot tell the age of a command that is itself held
+    own = step / math.sqrt(12.0)  # a tick does not show the age of a command that is itself held
     best = _widened(best, name, math.hypot(0.5 * spread, own))
 
     share = min(max(REACH, 3.0 * spread / rough), 0.5)

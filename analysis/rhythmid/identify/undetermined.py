@@ -1,4 +1,4 @@
-"""Directions in parameter space that records do not determine, and sums of parameters that they do."""
+"""Directions in parameter space that are not identifiable from the records, and sums of parameters that are."""
 
 import math
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Direction:
-    """A change of parameters (unit vector, in units of their sizes) that the records do not notice, in words."""
+    """A change of parameters (unit vector, in units of their sizes) to which the records are insensitive, in words."""
 
     names: tuple[str, ...]
     weights: Array
@@ -27,7 +27,7 @@ class Direction:
 def undetermined(fit: Fit) -> list[Direction]:
     """Directions in parameter space whose standard deviation exceeds the sizes of the parameters.
 
-    Null space of the Fisher information, each parameter measured by what it would have to be to matter: see `natural_size`.
+    They are the null space of the Fisher information, with each parameter scaled by its natural size: see `natural_size`.
     """
     p = len(fit.names)
     if p == 0:
@@ -40,14 +40,14 @@ def undetermined(fit: Fit) -> list[Direction]:
         if prior is not None:
             information[i, i] += (size[i] / prior.std) ** 2
     values, vectors = np.linalg.eigh(information)
-    floor = max(1.0, 1e-11 * float(values[-1]))  # below this lies the error of the differences
+    floor = max(1.0, 1e-11 * float(values[-1]))  # below this the error of the finite differences dominates
     felt = np.linalg.norm(fit.linearisation.jacobian, axis=0)
     return [_direction(fit.names, vectors[:, i], size, felt) for i in range(p) if values[i] < floor]
 
 
 def _direction(names: Sequence[str], vector: Array, size: Array, felt: Array) -> Direction:
-    """In words, with the parameters that take part: as their sizes go, or as they are `felt`, by their effect a unit, for the
-    value of one that nothing determines may be anything."""
+    """The direction in words, with the parameters that take part, measured by their sizes or by the effect per unit
+    in `felt`. The second is needed because the value of an undetermined parameter is arbitrary."""
     share, part = np.abs(vector) / np.abs(vector).max(), np.abs(vector * size * felt)
     large = np.flatnonzero((share > 0.05) | ((share > 1e-6) & (part > 0.05 * part.max())))
     moved = [names[int(i)] for i in large]
@@ -63,7 +63,7 @@ def _direction(names: Sequence[str], vector: Array, size: Array, felt: Array) ->
 
 
 def sum_of(fit: Fit, *names: str) -> Estimate:
-    """Sum of parameters with its standard deviation; None where it is not determined."""
+    """Sum of parameters with its standard deviation; None where it is not identifiable."""
     value = sum(fit.model.value(name) for name in names if name in fit.model.parameters)
     places = np.array([name in names for name in fit.names], dtype=bool)
     norm = np.linalg.norm(fit.linearisation.jacobian[:, places].sum(axis=1)) if places.any() else 0.0
@@ -71,14 +71,15 @@ def sum_of(fit: Fit, *names: str) -> Estimate:
     variance = float(own.sum()) if np.isfinite(own).all() else math.inf
     if (
         places.sum() > 1 and not 0.0 < variance < 1.0
-    ):  # the sum of two undetermined ones is lost in their rounding
+    ):  # the sum of two undetermined parameters is lost in their rounding errors
         variance = 1.0 / max(_projected(fit, places) ** 2, 1e-300) if norm > 0.0 else math.inf
     std = math.sqrt(variance) if variance >= 0.0 else math.inf
     return Estimate(float(value), std if math.isfinite(std) and std < 1e6 else None, "s")
 
 
 def _projected(fit: Fit, places: NDArray[np.bool_]) -> float:
-    """Norm of the sensitivity to the first of the parameters `places`, all parameters that are not theirs projected out."""
+    """Norm of the sensitivity to the first of the parameters `places`, with all parameters outside `places`
+    projected out."""
     column = fit.linearisation.jacobian[:, np.flatnonzero(places)[0]]
     others = fit.linearisation.jacobian[:, ~places]
     if others.shape[1]:
@@ -88,7 +89,7 @@ def _projected(fit: Fit, places: NDArray[np.bool_]) -> float:
 
 
 def sum_beside(fit: Fit, names: Sequence[str]) -> Estimate:
-    """The sum of parameters of which none is determined, in the model with all but one of them held."""
+    """The sum of parameters that are not identifiable separately, in the model with all but one of them fixed."""
     places = np.array([name in names for name in fit.names])
     value = sum(fit.model.value(name) for name in names)
     return Estimate(float(value), 1.0 / max(_projected(fit, places), 1e-150), "s")

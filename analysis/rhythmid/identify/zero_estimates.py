@@ -1,4 +1,4 @@
-"""Zeros that differ from record to record, as a fit has found them."""
+"""Estimated zeros of records whose output is measured from different zeros."""
 
 import math
 
@@ -11,9 +11,10 @@ from rhythmid.identify.series import record_of
 
 
 def zeros_of(fit: Fit) -> dict[str, tuple[float, float]]:
-    """The zero of each record that has one of its own, and its standard deviation beside all parameters and starts, [output's unit].
+    """The zero of each record that has its own, and its standard deviation together with all parameters and starts,
+    [output's unit].
 
-    Of a record that is cut into stretches, that of the first. Empty for a model without such zeros.
+    For a record that is cut into stretches, the zero of the first. Empty for a model without such zeros.
     """
     place = zero_place(fit.run.compiled.layout.states)
     own = [i for i, one in enumerate(fit.run.series) if one.zero is not None]
@@ -45,7 +46,7 @@ def zeros_of(fit: Fit) -> dict[str, tuple[float, float]]:
 
 
 def zeros_told(fit: Fit) -> tuple[str, ...]:
-    """One sentence on the zeros; none where all records have the same."""
+    """One sentence on the zeros; empty where all records have the same."""
     found = zeros_of(fit)
     if not found:
         return ()

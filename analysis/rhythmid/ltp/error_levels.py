@@ -1,4 +1,4 @@
-"""What a record's empty bins say about the errors of its transfer functions: noise, distortion, higher harmonics."""
+"""Error levels of transfer functions from a record's empty bins: noise, distortion, higher harmonics."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ from rhythmid.ltp.excited_lines import ExcitedLines
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-FEW, MANY = 12, 60  # empty bins over which a level is averaged: one that varies along frequency, and noise
-CLEAR = 2.0  # standard deviations by which a level must exceed another to stand out
+FEW, MANY = 12, 60  # empty bins over which a level is averaged: a level that varies with frequency, and noise
+CLEAR = 2.0  # standard deviations by which a level must exceed another one
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """Mean power |Y|² of an error in each bin [unit² s²], (L + 1,), and over how many bins it was averaged."""
+    """Mean power |Y|² of an error in each bin [unit² s²], (L + 1,), and the number of bins in each average."""
 
     power: Array
     freedom: Array
@@ -36,7 +36,7 @@ def local_level(power: Array, where: Mask, count: int) -> Level:
 
 @dataclass(frozen=True, eq=False)
 class ErrorLevels:
-    """What the empty bins show: noise, distortion of even and odd order (NaN where they cannot be told apart), and
+    """Levels measured in empty bins: noise, distortion of even and odd order (NaN where they cannot be separated), and
     `higher`, the squared size of HTFs beyond those estimated [(output unit / input unit)²]."""
 
     noise: Level
@@ -68,13 +68,13 @@ def error_levels(lines: ExcitedLines, harmonics: int) -> ErrorLevels:
 
 
 def _classes(lines: ExcitedLines, empty: Mask) -> list[Mask]:
-    """Empty bins by residue class: in a comb, by the higher harmonics that reach them."""
+    """Empty bins by residue class; in a comb, by the higher harmonics that reach them."""
     present = np.unique(lines.classes[empty])
     return [empty & (lines.classes == one) for one in present] if len(present) <= 32 else [empty]
 
 
 def _least(levels: Sequence[Level]) -> Level:
-    """The least level in each bin, pooled with those that do not stand out above it."""
+    """The smallest level in each bin, pooled with those that do not exceed it significantly."""
     power, freedom = np.array([one.power for one in levels]), np.array([one.freedom for one in levels])
     least = power.min(axis=0)
     alike = power <= (1.0 + CLEAR * np.sqrt(2.0 / np.maximum(freedom, 1.0))) * least
@@ -83,13 +83,13 @@ def _least(levels: Sequence[Level]) -> Level:
 
 
 def _excess(level: Level, noise: Level) -> Array:
-    """Power above the noise, where it stands out of the scatter of both averages."""
+    """Power above the noise, where it exceeds the scatter of both averages."""
     scatter = np.sqrt(1.0 / np.maximum(level.freedom, 1.0) + 1.0 / np.maximum(noise.freedom, 1.0))
     return np.where(level.power > (1.0 + CLEAR * scatter) * noise.power, level.power - noise.power, 0.0)
 
 
 def _higher(lines: ExcitedLines, harmonics: int, power: Array, empty: Mask, noise: Level) -> Array:
-    """Mean square of HTFs beyond ±M where only such reach a bin."""
+    """Mean square of HTFs beyond ±M, from bins that only these reach."""
     source = power_beyond(lines, harmonics)
     seen = empty & (source > 0.0)
     above = _excess(local_level(power, seen, FEW), noise)

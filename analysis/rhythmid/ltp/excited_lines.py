@@ -1,11 +1,12 @@
-"""Which bins of a record's spectra answer which harmonic, and which bins hold nothing but errors.
+"""Assignment of a record's spectral bins to harmonics, and bins that contain only errors.
 
-An input line at bin k answers in the bins k + mP, P the pumping frequency's bin. Where the excitation is laid out so
-that at most one harmonic m reaches a bin, that harmonic can be read off there; bins that none reaches show noise, and
-distortion: products of an even number of lines fall into even multiples of the lattice that lines and pumping span,
-products of an odd number into odd ones, if all lines are odd and P is even (R. Pintelon, J. Schoukens, System
-Identification: A Frequency Domain Approach, 2nd ed., 2012, chapter 4; time-periodic: E. Louarroudi et al., IEEE TIM
-61(5), 2012). Shifted chirps are such a layout: K chirps of period (n + 1/K) T put harmonic m into the bins m mod K.
+An input line at bin k causes a response in the bins k + mP, with P the bin of the pumping frequency. If the
+excitation is designed so that at most one harmonic m reaches a bin, that harmonic can be read directly. Bins that
+no harmonic reaches show noise and distortion. Products of an even number of lines fall on even multiples of the
+lattice spanned by lines and pumping, products of an odd number on odd ones, if all lines are odd and P is even (R.
+Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., 2012, chapter 4; time-periodic:
+E. Louarroudi et al., IEEE TIM 61(5), 2012). Shifted chirps are such a design: K chirps of period (n + 1/K) T put
+harmonic m into the bins m mod K.
 """
 
 from dataclasses import dataclass
@@ -18,8 +19,8 @@ from rhythmid.ltp.spectra import Spectra
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-STRONG = 0.3  # of the typical line, from which a line is good for an estimate
-LIVE = 1e-3  # of the typical line, below which it is taken for none
+STRONG = 0.3  # share of the typical line above which a line is used for an estimate
+LIVE = 1e-3  # share of the typical line below which a line is taken as zero
 FARTHEST = 12  # harmonics on either side that may reach a bin
 
 
@@ -38,7 +39,7 @@ class ExcitedLines:
 
     @property
     def farthest(self) -> int:
-        """Harmonics on either side that are considered at all."""
+        """Number of harmonics on either side that are considered."""
         return FARTHEST if self.periods else 0
 
     def reaching(self, m: int, lines: Mask) -> Mask:
@@ -49,15 +50,15 @@ class ExcitedLines:
 
     @cached_property
     def within(self) -> Mask:
-        """Bins that count: above zero, up to the highest that a strong line and the first sideband reach, and none of
-        the limit cycle's."""
+        """Bins that are used: above zero, up to the highest that a strong line and the first sideband reach, and
+        without those of the limit cycle."""
         bins = np.arange(len(self.live))
         last = int(np.flatnonzero(self.strong)[-1]) + self.periods
         inside = (bins > 0) & (bins <= last)
         return inside & (bins % self.periods != 0) if self.periods else inside
 
     def alone(self, m: int, harmonics: int) -> Mask:
-        """Bins in which of the harmonics up to ±`harmonics` only m answers, and a strong line."""
+        """Bins with a strong line that only m reaches, among the harmonics up to ±`harmonics`."""
         found = self.reaching(m, self.strong) & self.within
         for n in range(-harmonics, harmonics + 1):
             if n != m:
@@ -74,12 +75,12 @@ class ExcitedLines:
 
     @cached_property
     def lattice(self) -> int:
-        """Greatest common divisor of lines and pumping: products of lines fall on its multiples only."""
+        """Greatest common divisor of lines and pumping: products of lines fall only on its multiples."""
         return int(np.gcd.reduce(np.append(np.flatnonzero(self.strong), self.periods)))
 
     @cached_property
     def quiet(self) -> Mask:
-        """Bins that not even distortion reaches: the excitation repeats within the record."""
+        """Bins that not even distortion reaches, because the excitation repeats within the record."""
         return self.within & (np.arange(len(self.live)) % self.lattice != 0) & ~self.live
 
     def empty(self, harmonics: int) -> Mask:
@@ -89,12 +90,12 @@ class ExcitedLines:
 
     @cached_property
     def linear(self) -> Mask:
-        """Bins that some harmonic reaches, however high."""
+        """Bins that any harmonic reaches."""
         return np.any([self.reaching(n, self.live) for n in range(-self.farthest, self.farthest + 1)], axis=0)
 
     @cached_property
     def parity(self) -> NDArray[np.int64] | None:
-        """0 for bins on which distortion of even order falls, 1 for odd; None where the excitation mixes them."""
+        """0 for bins of even-order distortion, 1 for odd; None where the excitation mixes them."""
         step = self.lattice
         lines = np.flatnonzero(self.strong) // step
         if np.any(lines % 2 == 0) or (self.periods // step) % 2 == 1:
@@ -103,14 +104,14 @@ class ExcitedLines:
 
     @cached_property
     def classes(self) -> NDArray[np.int64]:
-        """Residue class of each bin modulo the lines' spacing: what falls together in a comb."""
+        """Residue class of each bin modulo the lines' spacing; bins of one class coincide in a comb."""
         lines = np.flatnonzero(self.strong)
         spacing = int(np.gcd.reduce(np.diff(lines))) if len(lines) > 1 else 1
         return np.arange(len(self.live)) % max(1, spacing)
 
 
 def excited_lines(spectra: Spectra) -> ExcitedLines:
-    """The lines of a record's input. Raises InputError when it is silent."""
+    """The lines of a record's input. Raises InputError when the input has no power."""
     low, high = spectra.band
     size = np.abs(spectra.input)
     band = (spectra.frequency >= low) & (spectra.frequency <= high)

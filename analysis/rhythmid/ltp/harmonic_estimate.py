@@ -1,4 +1,4 @@
-"""What an estimator of harmonic transfer functions returns: each function with all that is known of its error."""
+"""Result of an estimator of harmonic transfer functions: each function with its error levels."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -18,21 +18,21 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False)
 class HarmonicEstimate:
-    """One harmonic transfer function, found without a model.
+    """One harmonic transfer function, estimated without a model.
 
-    All of shape (n,), the levels as standard deviations of the complex value, √E|ΔH|², in its own unit; NaN where the
-    excitation cannot tell a level apart from the others.
+    All arrays have shape (n,). Levels are standard deviations of the complex value, √E|ΔH|², in its own unit; NaN
+    where the excitation does not separate a level from the others.
 
     Attributes
     ----------
     m : index of the harmonic.
     frequency : output frequencies [Hz].
     value : complex128 H_m(jω) [output unit / input unit], delays included, in cycle time (see `Pumping`).
-    std : of the value, from all that follows.
-    freedom : degrees of freedom on which `std` rests.
-    noise : what noise does.
-    even, odd : what distortion of even and of odd order does, as far as it looks like noise.
-    aliasing : what harmonics beyond those estimated may add.
+    std : standard deviation of the value from all error sources below.
+    freedom : degrees of freedom of `std`.
+    noise : level of noise.
+    even, odd : levels of distortion of even and of odd order, as far as it acts like noise.
+    aliasing : possible level of harmonics beyond those estimated.
     """
 
     m: int
@@ -47,13 +47,13 @@ class HarmonicEstimate:
 
     @property
     def radius(self) -> Array:
-        """Radius of the disk about the value that holds the truth with 95 %: |ΔH|² ≤ std² F.95(2, 2 freedom)."""
+        """Radius of the disk about the value that contains the true value with 95 %: |ΔH|² ≤ std² F.95(2, 2 freedom)."""
         return self.std * np.sqrt(f_distribution.ppf(0.95, 2.0, 2.0 * self.freedom))
 
 
 @dataclass(frozen=True)
 class Significance:
-    """Whether harmonics ±m stand out of the noise: `p_value`, and whether it is below the `threshold` of the test."""
+    """Whether harmonics ±m exceed the noise: `p_value`, and whether it is below the `threshold` of the test."""
 
     m: int
     p_value: float
@@ -66,8 +66,8 @@ class Significance:
 
 @dataclass(frozen=True, eq=False)
 class HarmonicEstimates:
-    """Transfer functions −M … M by one `method`; `tested` is how M was chosen, with its probability `false_alarm` of an M
-    that is too large; empty where M was given."""
+    """Transfer functions −M … M by one `method`. `tested` holds the tests that selected M, with probability
+    `false_alarm` of an M that is too large; empty where M was given."""
 
     method: str
     functions: tuple[HarmonicEstimate, ...]
@@ -89,8 +89,8 @@ class HarmonicEstimates:
     def to_xarray(self, unit: str = "") -> "xr.Dataset":
         """The functions as an xarray Dataset over `harmonic` and `frequency` [Hz].
 
-        Its variables are `value` (complex), `std`, `radius` (of the disk that holds the truth with 95 %) and `noise`; `unit` is
-        written beside them. Raises InputError where xarray is not installed.
+        Its variables are `value` (complex), `std`, `radius` (of the disk that contains the true value with 95 %)
+        and `noise`; `unit` is stored as their unit. Raises InputError where xarray is not installed.
         """
         from rhythmid.ltp.dataset import dataset
 

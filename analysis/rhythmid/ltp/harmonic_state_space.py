@@ -17,7 +17,7 @@ from rhythmid.ltp.linearisation import Linearisation
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 TRUNCATION = 20  # harmonics kept on either side
-# of the fastest mode, nearer than which to a frequency that is asked for a pole lies upon it
+# distance to a pole, relative to the fastest mode, below which a requested frequency lies on the pole
 INTEGRATES = 1e-9
 
 

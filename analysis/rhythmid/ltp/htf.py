@@ -1,4 +1,4 @@
-"""Harmonic transfer functions (HTFs): how an input at one frequency appears at others, whether from a model or from data.
+"""Harmonic transfer functions (HTFs): the response at other frequencies to an input at one, from a model or from data.
 
 Convention of the paper's equation (4), used throughout: Y(jω) = Σ_m G_m(jω) U(j(ω − mω_p)), with ω the output's frequency.
 A real system has G_−m(−jω) = conj G_m(jω).
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-# harmonics of the state kept on either side; more changes the paper's G_0 and G_±1 by less than 5e-5
+# harmonics of the state kept on either side; more change the paper's G_0 and G_±1 by less than 5e-5
 ORDER = 12
 
 
@@ -64,7 +64,7 @@ class HarmonicTransferFunctions:
         return replace(self, value=self.value * np.exp(-1j * turn))
 
     def to_xarray(self, unit: str = "") -> "xr.Dataset":
-        """The functions as an xarray Dataset over `harmonic` and `frequency` [Hz]; `unit` is written beside them.
+        """The functions as an xarray Dataset over `harmonic` and `frequency` [Hz]; `unit` is stored as their unit.
 
         Raises InputError where xarray is not installed.
         """
@@ -110,7 +110,7 @@ def linearised(
 ) -> LinearisedModel:
     """Limit cycle, equation (1) and equation (2) of a model. `guess` as for `limit_cycle`, `effort` as for `linearise`.
 
-    Raises InputError when there is no limit cycle, and for an input whose rate acts too (a moving base).
+    Raises InputError when there is no limit cycle, and for an input that also acts by its rate (a moving base).
     """
     if excited == "base_displacement":
         raise InputError(
@@ -121,7 +121,7 @@ def linearised(
 
 
 def transport_delays(model: Model, at: float = 0.0) -> tuple[float, float]:
-    """Delays (τ_u, τ_y) [s] of the model's command and measurement paths, for stamps near `at` [s]."""
+    """Delays (τ_u, τ_y) [s] of the model's command and measurement paths, for timestamps near `at` [s]."""
     stamps = np.array([at])
 
     def total(*slots: str) -> float:

@@ -21,10 +21,10 @@ from rhythmid.simulation.signal import pieces
 from rhythmid.simulation.simulate import MAX_STEP, start_states
 
 Array = NDArray[np.float64]
-SAMPLES = 1000  # of the cycle
-RELAXATION = 10  # periods simulated where Newton's method does not help
-SETTLING = 8  # periods simulated before Newton's method takes over
-TOLERANCE = 1e-11  # of the fixed point, relative to the motion
+SAMPLES = 1000  # samples of the cycle
+RELAXATION = 10  # periods simulated where Newton's method fails
+SETTLING = 8  # periods simulated before Newton's method starts
+TOLERANCE = 1e-11  # tolerance of the fixed point, relative to the motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class RightHandSide:
 
 
 def right_hand_side(model: Model, pumping: Pumping, excited: InputKind = "force") -> RightHandSide:
-    """The model's right-hand side under the pumping; what an element remembers is from `MAX_STEP` before."""
+    """The model's right-hand side under the pumping; memory states are taken `MAX_STEP` earlier."""
     compiled = compile_rates(model, excited)
     parameters = compiled.layout.vector(model)
     for index, (name, _) in enumerate(compiled.layout.parameters):
@@ -66,8 +66,8 @@ class LimitCycle:
     Attributes
     ----------
     time : float64[n + 1] from 0 to T [s], both ends included.
-    states, rates : float64[n + 1, q] state vector and its derivative; of memories, as they were `MAX_STEP` before.
-    output : float64[n + 1] what the sensor says.
+    states, rates : float64[n + 1, q] state vector and its derivative; memory states as they were `MAX_STEP` earlier.
+    output : float64[n + 1] sensor output.
     monodromy : float64[q, q] Jacobian of the period map; its eigenvalues are the Floquet multipliers.
     closure : distance between the state's two ends, relative to its motion.
     """
@@ -111,7 +111,7 @@ class LimitCycle:
 
 
 class PeriodMap:
-    """x(0) -> x(T) of the forced, uncommanded model, and what lies between."""
+    """Map x(0) -> x(T) of the forced, uncommanded model, with the trajectory between."""
 
     def __init__(self, model: Model, pumping: Pumping, excited: InputKind, max_step: float) -> None:
         self.compiled = compile_model(model, Variant(excited, rational=True))
@@ -136,13 +136,13 @@ class PeriodMap:
         return self.rows(start, self.ends)[-1, : len(start)]
 
     def relaxed(self, start: Array, periods: int) -> Array:
-        """The state after so many periods."""
+        """The state after `periods` periods."""
         for _ in range(periods):
             start = self(start)
         return start
 
     def jacobian(self, start: Array, scale: Array) -> Array:
-        """Central differences of the map with steps of 1e-4 of the motion: jumps of the force want them no smaller."""
+        """Central differences of the map with steps of 1e-4 of the motion; force jumps rule out smaller ones."""
         q = len(start)
         jacobian = np.empty((q, q))
         for i in range(q):
@@ -153,7 +153,7 @@ class PeriodMap:
 
 
 def _start(model: Model, compiled: Compiled) -> Array:
-    """At rest where the model's springs would leave it: position at the first rest length, or zero."""
+    """State at rest: position at the first rest length, or zero."""
     return start_states(model, compiled, model.borrowed("linear_spring.rest_length", 0.0) or 0.0, 0.0)
 
 
@@ -192,7 +192,7 @@ def limit_cycle(
             jacobian = period_map.jacobian(start, scale)
             start = start + np.linalg.lstsq(np.eye(len(start)) - jacobian, difference, rcond=1e-9)[0]
             before = error
-        else:  # Newton's method does not help here; the cycle itself attracts
+        else:  # Newton's method fails here, but the cycle is attractive
             start = period_map.relaxed(start, RELAXATION)
             before = np.inf
     if error > 1e-6:
@@ -203,7 +203,7 @@ def limit_cycle(
     jacobian = period_map.jacobian(start, scale)
     for (
         place
-    ) in period_map.compiled.layout.memories:  # its rate tells what it became since, see `right_hand_side`
+    ) in period_map.compiled.layout.memories:  # its rate gives the change since then, see `right_hand_side`
         states[:, place] = np.interp(grid - MAX_STEP, grid, states[:, place], period=pumping.period)
     rates = right_hand_side(model, pumping, excited)(grid, states[None])[0, :, : len(start)]
     return LimitCycle(

@@ -21,14 +21,14 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 PANELS = 96  # of the quadrature, in a period
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
-SMALLEST = 1e-3  # jump, relative to the variation of what jumps, that is looked for
+SMALLEST = 1e-3  # least jump relative to the variation of the quantity
 STRETCH = 2e-3  # periods before and after a jump of the force over which its effect is measured
 STEP = 1e-6  # of the differences, relative to the motion
 
 
 @dataclass(frozen=True, eq=False)
 class Impulse:
-    """A Dirac impulse `size` δ(t − time) in A(t): what a jump of the force does to perturbations."""
+    """A Dirac impulse `size` δ(t − time) in A(t): effect of a force jump on perturbations."""
 
     time: float
     size: Array
@@ -42,8 +42,8 @@ class Linearisation:
     ----------
     time, weight : float64[n] quadrature nodes over one period [s] and their weights [s].
     jacobian : float64[n, q + 1, q + 1] at the nodes: A | B over C | D.
-    switches : float64[k] instants at which they jump [s].
-    impulses : what jumps of the force add to A(t).
+    switches : float64[k] instants [s] at which these matrices jump.
+    impulses : Dirac impulses in A(t) due to force jumps.
     """
 
     cycle: LimitCycle
@@ -95,15 +95,15 @@ class _Jacobian:
         return np.stack(columns, axis=2), rows[-1, :, :q]
 
     def scaled(self, time: Array) -> Array:
-        """Jacobian and right-hand side as one row a time, each entry in units of the motion: (n, k)."""
+        """Jacobian and right-hand side as one row per time, each entry in units of the motion: (n, k)."""
         inside = np.mod(time, self.cycle.pumping.period)
         jacobian, flow = self.at(inside)
         motion = np.concatenate([self.steps, [self.effort_step]]) / STEP
         return np.hstack([(jacobian * motion).reshape(len(time), -1), flow])
 
     def variation(self) -> Array:
-        """How much each entry of `scaled` varies along the cycle, (k,); at least a thousandth of the largest in its row
-        of the Jacobian, so that the rounding of differences is not taken for a variation."""
+        """Variation of each entry of `scaled` along the cycle, (k,). It is at least a thousandth of the largest in
+        its row of the Jacobian, so that rounding errors of differences do not count."""
         q = len(self.steps)
         values = self.scaled(self.cycle.time)
         largest = np.abs(values).max(axis=0)
@@ -122,7 +122,7 @@ def _bisect(
 ) -> tuple[Array, Array, Array]:
     """Halve each interval [low, high] towards the side across which the signal (n, k) changes more.
 
-    Returns the ends and the largest change (n,) that is left across them.
+    Returns the ends and the largest remaining change (n,) across them.
     """
     at_low, at_high = signal(low), signal(high)
     for _ in range(rounds):
@@ -136,9 +136,9 @@ def _bisect(
 
 
 def _jumps(jacobian: _Jacobian) -> tuple[Array, Array]:
-    """Instants at which Jacobian or right-hand side jump (k,), and grid times around which they change fast."""
+    """Instants (k,) at which Jacobian or right-hand side jump, and grid times around which they change rapidly."""
     time = jacobian.cycle.time
-    inner = time[:-1] + 0.5 * np.diff(time)  # a switch on a grid time is then inside an interval
+    inner = time[:-1] + 0.5 * np.diff(time)  # so that a switch at a grid time lies inside an interval
     low, high = np.concatenate([[inner[-1] - time[-1]], inner[:-1]]), inner
     period = jacobian.cycle.pumping.period
     scale = jacobian.variation()
@@ -164,10 +164,10 @@ def _jumps(jacobian: _Jacobian) -> tuple[Array, Array]:
 
 
 def _impulse(jacobian: _Jacobian, time: float) -> Impulse | None:
-    """What a jump of the right-hand side at `time` does; None where it is continuous there.
+    """Impulse by a jump of the right-hand side at `time`; None where it is continuous there.
 
-    The saltation matrix is what is left of the state's sensitivity across a short stretch, simulated in very fine steps,
-    when the smooth motion before and after is undone.
+    The state's sensitivity across a short stretch is simulated in very fine steps. The saltation matrix remains
+    after the smooth motion before and after the jump is removed.
     """
     cycle, period = jacobian.cycle, jacobian.cycle.pumping.period
     q = len(jacobian.steps)
@@ -194,8 +194,8 @@ def _impulse(jacobian: _Jacobian, time: float) -> Impulse | None:
 def linearise(cycle: LimitCycle, effort: float | None = None) -> Linearisation:
     """Linearise a model around its limit cycle; equation (1), and for the paper's plant (11)-(13).
 
-    `effort` [N] is the size of a perturbing command, against which difference steps are measured; the size of the
-    forcing, or 1, where it is None.
+    `effort` [N] is the size of a perturbing command, which scales the difference steps; with None it is the size of the
+    forcing, or 1.
     """
     if effort is None:
         effort = float(np.abs(cycle.pumping.coefficients[1:]).max(initial=0.0)) or 1.0

@@ -1,14 +1,14 @@
-"""HTFs from dense excitations: the local rational method, with transients and leakage as terms of their own.
+"""HTFs from dense excitations: the local rational method, with transients and leakage as separate terms.
 
-Around each output frequency all 2M + 1 transfer functions and the transient are low-order polynomials over one common
-denominator of first order, for a time-periodic machine has the same poles in all of them:
+Around each output frequency all 2M + 1 transfer functions and the transient are low-order polynomials over one
+common first-order denominator, because all of them have the poles of the same time-periodic machine:
 
     (1 + a r) Y_{l+r} = Σ_m Σ_s b_{ms} r^s U_{l+r−mP} + Σ_s t_s r^s + noise,    r = −n … n
 
 (T. McKelvey, G. Guérin, Nonparametric frequency response estimation using a local rational model, SYSID 2012; the
 polynomial form for time-periodic systems: E. Louarroudi, R. Pintelon, J. Lataire, IEEE TIM 61(5), 2012.) The
-denominator multiplies noisy data, which would bias it; so the equations are solved again with the predicted output as
-instrument. What remains of the equations is the error, noise and distortion alike.
+denominator multiplies noisy data, which would bias it. So the equations are solved again with the predicted output
+as instrumental variable. The residual of the equations contains noise and distortion.
 """
 
 from dataclasses import dataclass
@@ -23,28 +23,29 @@ from rhythmid.ltp.harmonic_estimate import HarmonicEstimate
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-ORDER = 2  # of the polynomials
-FREEDOM = 20  # degrees of freedom that are left for the error
-ROUNDS = 3  # of solving with instruments
-MOST_LOCAL_HARMONICS = 3  # M that is considered
-# half-width of a window, as a multiple of the resonance's own half-width, that a local model bears
+ORDER = 2  # order of the polynomials
+FREEDOM = 20  # degrees of freedom left for the error
+ROUNDS = 3  # solutions with instrumental variables
+MOST_LOCAL_HARMONICS = 3  # largest M
+# largest half-width of a window, as a multiple of the resonance's half-width
 WIDEST = 2.5
-RANK = 1e-6  # singular value, relative to the largest, below which a combination is not determined
-POOR = 100.0  # times the usual variance, beyond which a value is not worth stating
-NEEDED = 1e-3  # probability of noise alone asking for a denominator
+RANK = 1e-6  # singular value, relative to the largest, below which a combination is not identifiable
+POOR = 100.0  # ratio to the usual variance above which a value is not reported
+NEEDED = 1e-3  # significance level for using a denominator
 UNSTABLE = 0.05  # least magnitude of the denominator
-LEAKAGE = 0.02  # below which the excitation is taken as periodic, so that bins off its lattice hold nothing but noise
-POINTS = 500  # frequencies at which the functions are estimated at most
+# leakage below which the excitation counts as periodic, so that bins off its lattice contain only noise
+LEAKAGE = 0.02
+POINTS = 500  # largest number of frequencies at which the functions are estimated
 
 
 def half_window(harmonics: int) -> int:
-    """n: bins on either side that leave enough degrees of freedom for M = `harmonics`."""
+    """n: number of bins on either side that leaves enough degrees of freedom for M = `harmonics`."""
     unknowns = (2 * harmonics + 2) * (ORDER + 1) + 1
     return -(-(unknowns + FREEDOM) // 2)
 
 
 def highest_local(lines: ExcitedLines, ring_down: float, highest: int = MOST_LOCAL_HARMONICS) -> int | None:
-    """Largest M for which a window is narrow against a resonance with this `ring_down` [s]; None if there is none."""
+    """Largest M whose window is narrow relative to a resonance with this `ring_down` [s]; None if there is none."""
     least = 1 if lines.periods else 0
     step = bin_step(lines) * lines.spectra.resolution
     for harmonics in range(min(highest, lines.farthest), least - 1, -1):
@@ -54,7 +55,7 @@ def highest_local(lines: ExcitedLines, ring_down: float, highest: int = MOST_LOC
 
 
 def bin_step(lines: ExcitedLines) -> int:
-    """Distance of the bins that are compared."""
+    """Distance between the bins that are used."""
     return lines.lattice if lines.spectra.window.leakage < LEAKAGE else 1
 
 
@@ -66,7 +67,7 @@ def _targets(lines: ExcitedLines) -> NDArray[np.int64]:
 
 
 def oversampling(lines: ExcitedLines, harmonics: int) -> int:
-    """How many neighbouring estimates come from the same data."""
+    """Number of neighbouring estimates from the same data."""
     targets = _targets(lines)
     apart = float(np.median(np.diff(targets))) if len(targets) > 1 else 1.0
     return max(1, int(np.ceil((2 * half_window(harmonics) + 1) * bin_step(lines) / apart)))
@@ -111,14 +112,14 @@ def local_rational(lines: ExcitedLines, harmonics: int) -> tuple[HarmonicEstimat
 
 
 def _near_lines(lines: ExcitedLines, m: int) -> NDArray[np.bool_]:
-    """Bins around which harmonic m brings strong lines, so that its function shows there."""
+    """Bins around which harmonic m has strong lines, so that its function can be estimated."""
     near = lines.reaching(m, lines.strong).astype(float)
     wide = 2 * bin_step(lines) + 1
     return np.convolve(near, np.ones(wide), mode="same") > 0.5
 
 
 def _quiet_power(lines: ExcitedLines, targets: NDArray[np.int64]) -> Array:
-    """Mean |Y|² around the targets where nothing but noise falls; NaN where the excitation does not repeat."""
+    """Mean |Y|² around the targets in bins with noise only; NaN where the excitation does not repeat."""
     if lines.quiet.sum() < MANY or bin_step(lines) == 1:
         return np.full(len(targets), np.nan)
     return local_level(np.abs(lines.spectra.output) ** 2, lines.quiet, MANY).power[targets]
@@ -139,9 +140,9 @@ def _solve(
 ) -> tuple[Complex, Array, Array, Array]:
     """Solve each window; regressors (w, rows, q), output (w, rows).
 
-    Returns values (w, q) at r = 0, their variance for an error of unit variance (inf where not determined), the error's
-    variance (w,), and its degrees of freedom (w,). The denominator is used where it explains what polynomials do not:
-    where there is only noise to explain, a pole would find some.
+    Returns values (w, q) at r = 0, their variance for an error of unit variance (inf where not identifiable), the
+    error's variance (w,), and its degrees of freedom (w,). The denominator is used only where polynomials leave a
+    significant residual: with noise alone, a pole would fit the noise.
     """
     size = np.linalg.norm(regressors, axis=1)
     size[size == 0.0] = 1.0
@@ -195,8 +196,8 @@ def _rational(scaled: Complex, output: Complex, r: Array) -> _Windows:
 
 
 def _variance(sensitivity: Complex, q: int) -> tuple[Array, NDArray[np.int64]]:
-    """Variances (w, q) of the first q unknowns for an error of unit variance, inf where not determined; and how many
-    combinations are determined (w,)."""
+    """Variances (w, q) of the first q unknowns for an error of unit variance, inf where not identifiable; and the
+    number of identifiable combinations (w,)."""
     _, singular, right = np.linalg.svd(sensitivity, full_matrices=False)
     known = singular > RANK * singular[:, :1]
     weight = np.abs(right) ** 2
@@ -207,7 +208,7 @@ def _variance(sensitivity: Complex, q: int) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _denominator(a: Complex, r: Array) -> Complex:
-    """1 + a r, kept away from zero."""
+    """1 + a r, limited away from zero."""
     bottom = 1.0 + a[:, None] * r
     size = np.abs(bottom)
     return np.where(size < UNSTABLE, UNSTABLE * bottom / np.maximum(size, 1e-12), bottom)

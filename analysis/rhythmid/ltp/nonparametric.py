@@ -1,4 +1,4 @@
-"""Harmonic transfer functions from data alone, by the method that suits the excitation, with as many harmonics as show."""
+"""Harmonic transfer functions without a model: selects the method for the excitation and the number of harmonics."""
 
 from typing import Literal
 
@@ -26,17 +26,17 @@ def harmonic_transfer_functions(
     harmonics: int | None = None,
     false_alarm: float = TOO_LARGE,
 ) -> HarmonicEstimates:
-    """Transfer functions −M … M of the machine behind the record whose `spectra` these are.
+    """Transfer functions −M … M of the machine from the `spectra` of a record.
 
     Parameters
     ----------
-    ring_down : time constant [s] of the machine's slowest motion, roughly; it says how narrow a resonance is.
-    method : `separated_lines` needs a periodic excitation laid out so that harmonics fall into bins of their own;
-        `local_rational` a dense one; `regularised_least_squares` is the paper's equation (5), which smooths. `auto` takes the
-        first of them that the excitation allows.
-    harmonics : M; None chooses the largest that stands out of the errors, with probability `false_alarm` of too many.
+    ring_down : time constant [s] of the machine's slowest motion, approximately; it gives the width of a resonance.
+    method : `separated_lines` needs a periodic excitation whose harmonics fall into separate bins; `local_rational`
+        a dense one; `regularised_least_squares` is the paper's equation (5), which smooths. `auto` takes the first
+        of them that the excitation allows.
+    harmonics : M; None chooses the largest significant one, with probability `false_alarm` of too many.
 
-    Raises InputError when the record excites nothing, or does not allow the `method` or so many `harmonics`.
+    Raises InputError when the record has no excitation, or does not allow the `method` or so many `harmonics`.
     """
     if method != "regularised_least_squares":
         lines = excited_lines(spectra)
@@ -95,8 +95,8 @@ def _local(
 
 
 def smoothed(estimate: HtfEstimate) -> HarmonicEstimates:
-    """What equation (5) found, where the excitation reaches, with noise and the bias of its smoothing in its bands; the residual does
-    not tell one kind of error from another."""
+    """Estimates by equation (5) where the excitation reaches. Their bands contain noise and smoothing bias; the
+    residual does not separate one kind of error from another."""
     found = []
     assert estimate.htf.std is not None
     whole = np.hypot(estimate.htf.std, estimate.bias)

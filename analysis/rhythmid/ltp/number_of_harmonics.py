@@ -1,4 +1,4 @@
-"""How many harmonics a record shows: a test of |Ĥ_m|² against its own variance, with a stated rate of false alarms."""
+"""Number of significant harmonics: a test of |Ĥ_m|² against its own variance, with a stated rate of false alarms."""
 
 from collections.abc import Sequence
 
@@ -13,10 +13,10 @@ TOO_LARGE = 0.01  # probability that the chosen M is too large
 def significance(
     functions: Sequence[HarmonicEstimate], every: int = 1, false_alarm: float = TOO_LARGE
 ) -> tuple[Significance, ...]:
-    """Test each pair ±m, m = 1 … M: where there is nothing but Gaussian noise, the mean of |Ĥ_m|²/std² is F-distributed.
+    """Test each pair ±m, m = 1 … M: with Gaussian noise alone, the mean of |Ĥ_m|²/std² is F-distributed.
 
-    Only `every` so-many-th point is taken, where neighbouring ones come from the same data. The thresholds share
-    `false_alarm` among all pairs (Bonferroni). Functions without a point show nothing.
+    Only every `every`-th point is used, where neighbouring points come from the same data. The thresholds share
+    `false_alarm` among all pairs (Bonferroni). Functions without a point are not significant.
     """
     highest = max(one.m for one in functions)
     found = []
@@ -27,7 +27,7 @@ def significance(
         freedom = np.concatenate([one.freedom[::every] for one in pair])
         p_value = 1.0
         if len(value):
-            # a variance with f degrees of freedom makes the ratio f / (f − 1) on average
+            # with f degrees of freedom the mean ratio is f / (f − 1)
             ratio = np.abs(value) ** 2 / np.maximum(std, 1e-300) ** 2 * (freedom - 1.0) / freedom
             pooled = max(float(freedom.mean()), 0.5 * len(value))
             p_value = float(f_distribution.sf(ratio.mean(), 2 * len(value), 2 * pooled))
@@ -36,5 +36,5 @@ def significance(
 
 
 def chosen(tests: Sequence[Significance]) -> int:
-    """The largest m that is visible; 0 if none is."""
+    """The largest significant m; 0 if there is none."""
     return max((test.m for test in tests if test.visible), default=0)

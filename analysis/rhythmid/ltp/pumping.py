@@ -1,4 +1,4 @@
-"""Pumping: the periodic forcing f0(t) that keeps the machine on its limit cycle, and whose phase is the time reference.
+"""Pumping: the periodic forcing f0(t) that keeps the machine on its limit cycle. Its phase is the time reference.
 
 All harmonic transfer functions are stated in *cycle time*, which is zero where the fundamental of f0 has phase zero, so
 they do not depend on when the recording began.
@@ -16,16 +16,17 @@ from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.signal import spline
 
 Array = NDArray[np.float64]
-NOT_PERIODIC = 0.05  # share of a forcing that a period may leave
-GRID = 1024  # knots a period of the forcing as a signal; a cubic spline then follows a sinusoid to 1e-12
+NOT_PERIODIC = 0.05  # share of a forcing that its periodic part may leave unexplained
+# knots in a period of the forcing as a signal; a cubic spline then approximates a sinusoid to 1e-12
+GRID = 1024
 
 
 @dataclass(frozen=True, eq=False)
 class Pumping:
     """Periodic forcing f0(t) = Re Σ_h F_h exp(j h ω_p (t − origin)), h = 0, 1, …, in the record's time t [s].
 
-    `coefficients` complex128[H + 1] [N] with F_1 real and not negative by choice of the `origin` [s]. `frequency` [Hz]
-    is 1/T; `source` says where this is known from. Where there is no forcing all coefficients are zero.
+    `coefficients` complex128[H + 1] [N] with F_1 real and nonnegative by choice of the `origin` [s]. `frequency` [Hz]
+    is 1/T; `source` names its origin. Without forcing all coefficients are zero.
     """
 
     frequency: float
@@ -75,7 +76,7 @@ class Pumping:
 
 
 def pumping_of_channel(channel: Channel, source: str = "forcing channel") -> Pumping:
-    """The pumping that a recorded forcing shows. Raises InputError when it is not periodic or covers < 2 periods."""
+    """The pumping in a recorded forcing. Raises InputError when it is not periodic or covers < 2 periods."""
     time, value = channel.time, channel.value
     if np.ptp(value) == 0.0:
         return Pumping(1.0, np.zeros(2, dtype=complex), 0.0, f"{source} (constant)")

@@ -2,15 +2,16 @@
 
     Ĝ = (Uᴴ U + α (D²)ᵀ D²)⁻¹ Uᴴ Y
 
-In each frequency bin one equation, Y_l = Σ_m G_m(jω_l) U_{l−mP}, has 2M + 1 unknowns; the second difference D² along
-frequency ties neighbouring bins together (A. Siddiqi, Identification of the Harmonic Transfer Functions of a Helicopter
-Rotor, MSc thesis, MIT, 2001). With the unknowns ordered bin by bin the matrix is banded and is factorised once.
+Each frequency bin gives one equation, Y_l = Σ_m G_m(jω_l) U_{l−mP}, with 2M + 1 unknowns. The second difference D²
+along frequency couples neighbouring bins (A. Siddiqi, Identification of the Harmonic Transfer Functions of a
+Helicopter Rotor, MSc thesis, MIT, 2001). With the unknowns ordered bin by bin the matrix is banded and is
+factorised once.
 
 **Choice of α.** The penalty acts as a window on the impulse response, ĝ(t) = g(t) / [1 + (t/t_c)⁴] with
-t_c = (⟨|U|²⟩/α)^{1/4} / (2πΔf), ⟨⟩ the mean over bins and Δf their width. So α is not a number to tune but a time t_c,
-which means the same in records of any length and excitations of any size. It is chosen as 12 ring-down times τ of the
-machine: the peak of a resonance then loses 24 (τ/t_c)⁴ ≈ 0.1 %, while noise from later than t_c, where there is no
-response, is kept out. What is lost is predicted by `smooth`, the same operator applied to a model.
+t_c = (⟨|U|²⟩/α)^{1/4} / (2πΔf), ⟨⟩ the mean over bins and Δf their width. So α is set by a time t_c, which has the
+same meaning for records of any length and excitations of any size. It is chosen as 12 ring-down times τ of the
+machine. The peak of a resonance then loses 24 (τ/t_c)⁴ ≈ 0.1 %, and noise later than t_c, where there is no
+response, is suppressed. `smooth` predicts the loss: it is the same operator applied to a model.
 """
 
 from collections.abc import Callable
@@ -29,8 +30,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 RING_DOWNS = 12.0  # t_c / τ
 HAT = np.pi / np.sqrt(2.0)  # ∫ dt / (1 + t⁴): effective length of the window, in t_c
-PROBES = 24  # random outputs by which the gain for noise is measured
-REACHED = 0.01  # of the greatest mean input power, below which nothing is known about a harmonic
+PROBES = 24  # random outputs used to measure the noise gain
+REACHED = 0.01  # share of the greatest mean input power below which a harmonic is not excited
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +59,7 @@ class RegularisedLeastSquares:
         return cho_solve_banded((self.factor, True), right.T.ravel()).reshape(-1, len(self.harmonics)).T
 
     def smooth(self, htf: Complex) -> Complex:
-        """What (5) would return if G_m (h, n) were the truth: its smoothing bias, exactly."""
+        """Estimate by (5) if G_m (h, n) were the true functions: its smoothing bias, exactly."""
         return self.solve(np.einsum("hn,hn->n", self.shifted, htf))
 
     @property
@@ -79,11 +80,11 @@ class RegularisedLeastSquares:
 
     @cached_property
     def power(self) -> Array:
-        """Mean input power (h, n) around each bin, as far as the window ties bins together [unit² s²]."""
+        """Mean input power (h, n) around each bin, over the bins that the window couples [unit² s²]."""
         return self._around(np.abs(self.shifted) ** 2)
 
     def _around(self, values: Array) -> Array:
-        """Mean of values (h, n) over the bins that the window ties together."""
+        """Mean of values (h, n) over the bins that the window couples."""
         tied = round(1.0 / (2.0 * self.window * self.spectra.resolution))
         wide = min(max(1, tied), (values.shape[1] - 1) // 2)  # no wider than the band
         kernel = np.ones(2 * wide + 1)
@@ -93,8 +94,9 @@ class RegularisedLeastSquares:
 
     @cached_property
     def noise_gain(self) -> tuple[Array, float]:
-        """Standard deviation of Ĝ (h, n) for white noise of unit deviation in every bin of Y, and how many degrees of
-        freedom (5) takes: both measured with random outputs (M. F. Hutchinson, Commun. Stat. 19 (1990) 433)."""
+        """Standard deviation of Ĝ (h, n) for white noise of unit deviation in every bin of Y, and the number of
+        degrees of freedom of (5), both measured with random outputs (M. F. Hutchinson, Commun. Stat. 19 (1990)
+        433)."""
         rng = np.random.default_rng(0)
         half = len(self.bins) // 2
         used = np.any(self.shifted != 0.0, axis=0)
@@ -108,11 +110,12 @@ class RegularisedLeastSquares:
         return np.sqrt(self._around(variance)), float(np.clip(taken, 0.0, used.sum() - 1.0))
 
     def bias(self, found: Complex) -> Array:
-        """Standard deviation (h, n) of what the smoothing takes from functions that bend as `found` (h, n) does.
+        """Standard deviation (h, n) of the smoothing bias for functions with the curvature of `found` (h, n).
 
-        The estimate is off by −α (Uᴴ U + α (D²)ᵀ D²)⁻¹ (D²)ᵀ D² G. The second differences of G are taken as random, as large as
-        those of the estimate around each bin, so that what no input resolves counts with what it resolves (G. Wahba, J. R. Stat.
-        Soc. B 45 (1983) 133; D. Nychka, J. Am. Stat. Assoc. 83 (1988) 1134: such bands cover on the average over frequency).
+        The estimate is off by −α (Uᴴ U + α (D²)ᵀ D²)⁻¹ (D²)ᵀ D² G. The second differences of G are taken as random,
+        of the same size as those of the estimate around each bin. So errors that no input resolves are included (G.
+        Wahba, J. R. Stat. Soc. B 45 (1983) 133; D. Nychka, J. Am. Stat. Assoc. 83 (1988) 1134: such bands cover on
+        average over frequency).
         """
         bends = np.abs(np.diff(found, 2, axis=1)) ** 2
         size = np.sqrt(self._around(np.pad(bends, ((0, 0), (1, 1)), mode="edge")))[:, 1:-1]
@@ -133,7 +136,7 @@ class RegularisedLeastSquares:
 
     @property
     def reached(self) -> NDArray[np.bool_]:
-        """Where the input says something about harmonic m at bin l, (h, n)."""
+        """Where the input excites harmonic m at bin l, (h, n)."""
         return self.power > REACHED * np.median(self.power[self.power > REACHED * self.power.max()])
 
 
@@ -146,8 +149,8 @@ def regularised_least_squares(
 ) -> RegularisedLeastSquares:
     """Set up and factorise equation (5) for `harmonics` M, that is m = −M … M.
 
-    The smoothing is given as the time `window` t_c [s], else follows from the machine's `ring_down` [s], or is stated as
-    `alpha` outright. Raises InputError when the record excites nothing.
+    The smoothing is given as the time `window` t_c [s], or follows from the machine's `ring_down` [s], or is given
+    directly as `alpha`. Raises InputError when the record has no excitation.
     """
     low, high = spectra.band
     m = np.arange(-harmonics, harmonics + 1)
@@ -174,7 +177,7 @@ def regularised_least_squares(
     diagonal[[0, -1]], diagonal[[1, -2]] = 1.0, 5.0
     first = np.full(n - 1, -4.0)
     first[[0, -1]] = -2.0
-    tiny = 1e-12 * mean  # where the input reaches nothing, a straight line is still undetermined
+    tiny = 1e-12 * mean  # without excitation, a straight line is still undetermined
     band[0] += np.repeat(alpha * diagonal, h) + tiny
     band[h, : h * (n - 1)] += np.repeat(alpha * first, h)
     band[2 * h, : h * (n - 2)] += alpha
@@ -189,14 +192,14 @@ def regularised_least_squares(
 
 @dataclass(frozen=True, eq=False)
 class HtfEstimate:
-    """HTFs found by equation (5).
+    """HTFs estimated by equation (5).
 
     Attributes
     ----------
     htf : Ĥ_m at positive frequencies, with standard deviations from the residual.
-    reached : bool[h, n], where the input says something about them.
+    reached : bool[h, n], where the input excites them.
     operator : the equation that was solved, for its smoothing bias.
-    noise : standard deviation of Y in a bin [unit s], as the residual shows it.
+    noise : standard deviation of Y in a bin [unit s], from the residual.
     solution : Ĝ_m in all bins, of either sign.
     """
 
@@ -208,7 +211,7 @@ class HtfEstimate:
 
     @property
     def bias(self) -> Array:
-        """Standard deviation (h, n) of what the smoothing takes, at positive frequencies."""
+        """Standard deviation (h, n) of the smoothing bias, at positive frequencies."""
         return self.operator.bias(self.solution)[:, self.operator.positive]
 
 

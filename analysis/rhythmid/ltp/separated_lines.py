@@ -1,7 +1,8 @@
-"""HTFs where the excitation separates the harmonics: each read off the bins that it reaches alone, Ĥ_m = Y_l / U_{l−mP}.
+"""HTFs from an excitation that separates the harmonics: each is read from the bins that it alone reaches, Ĥ_m = Y_l
+/ U_{l−mP}.
 
-Nothing is smoothed, so nothing is biased by a resonance. The record's own empty bins say what the error is: noise where
-the lattice of lines has none, distortion of either parity where only that falls, higher harmonics where only those reach.
+There is no smoothing, so a resonance causes no bias. The record's empty bins show the error: noise in bins off the
+lattice of lines, distortion of either parity where only that falls, higher harmonics where only those reach.
 """
 
 import numpy as np
@@ -12,12 +13,13 @@ from rhythmid.ltp.excited_lines import ExcitedLines
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimate
 
 Array = NDArray[np.float64]
-SEPARATED = 0.8  # share of a harmonic's bins that it must have for itself
-MOST_SEPARATED_HARMONICS = 8  # M that is considered
+SEPARATED = 0.8  # share of a harmonic's bins that no other harmonic reaches
+MOST_SEPARATED_HARMONICS = 8  # largest M
 
 
 def highest_separated(lines: ExcitedLines, highest: int = MOST_SEPARATED_HARMONICS) -> int | None:
-    """Largest M whose harmonics this excitation separates, with empty bins left to show the error; None if there is none."""
+    """Largest M whose harmonics this excitation separates, with empty bins left to measure the error; None if there
+    is none."""
     least = 1 if lines.periods else 0
     for harmonics in range(min(highest, lines.farthest), least - 1, -1):
         left = lines.empty(harmonics).sum() + lines.quiet.sum()
@@ -27,7 +29,7 @@ def highest_separated(lines: ExcitedLines, highest: int = MOST_SEPARATED_HARMONI
 
 
 def read_off(lines: ExcitedLines, harmonics: int) -> tuple[HarmonicEstimate, ...]:
-    """H_m for m = −M … M (`harmonics`) from the bins that each reaches alone."""
+    """H_m for m = −M … M (`harmonics`) from the bins that each alone reaches."""
     found = error_levels(lines, harmonics)
     beyond = power_beyond(lines, harmonics)
     resolution = lines.spectra.resolution
@@ -39,7 +41,7 @@ def read_off(lines: ExcitedLines, harmonics: int) -> tuple[HarmonicEstimate, ...
         noise = np.sqrt(found.noise.power[bins]) / size
         even, odd = np.sqrt(found.even[bins]) / size, np.sqrt(found.odd[bins]) / size
         aliasing = np.sqrt(found.higher[bins] * beyond[bins]) / size
-        # with odd lines, even distortion never falls where a function is read off
+        # with odd lines, even distortion never falls into bins that are used
         std = np.sqrt(noise**2 + np.nan_to_num(odd) ** 2 + aliasing**2)
         frequency: Array = bins.astype(float) * resolution
         made.append(

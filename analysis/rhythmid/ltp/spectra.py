@@ -1,8 +1,8 @@
-"""Spectra of a record over a whole number of pumping periods, with the warm-up left out and the limit cycle set apart.
+"""Spectra of a record over a whole number of pumping periods, without the warm-up, and with the limit cycle separated.
 
-Over a window of P periods the limit cycle falls on the bins nP and nowhere else. If the command before the window
-repeats at the window's end (chirps that follow one another in a cycle, a multisine, or silence), the response is periodic
-too, and nothing leaks: the choice of window looks for that.
+Over a window of P periods the limit cycle occupies the bins nP only. If the command before the window repeats at
+the window's end (chirps in a cycle, a multisine, or silence), the response is periodic, too, and there is no
+leakage. The window is chosen accordingly.
 """
 
 from dataclasses import dataclass
@@ -18,15 +18,18 @@ from rhythmid.simulation.signal import continuous, fast_length
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-RING_DOWNS = 12.0  # of warm-up: e^-12 = 6e-6 of any transient is left
-# [rad] a cell of the integrated input covers at the highest frequency; relative error FINE^2 / 12
+RING_DOWNS = 12.0  # warm-up in ring-downs: e^-12 = 6e-6 of any transient remains
+# [rad] phase per cell of the integrated input at the highest frequency; relative error FINE^2 / 12
 FINE = 0.03
 
 
 @dataclass(frozen=True)
 class Window:
-    """start [s] in the record's time, whole `periods` P, and how far the command before `start` differs from that before
-    the end (rms, weighted as the machine forgets, relative to the command): the `leakage` into the spectra."""
+    """Start [s] in the record's time, number of whole `periods` P, and the `leakage` into the spectra.
+
+    The leakage is the rms difference between the commands before `start` and before the end of the window, relative
+    to the command and weighted by the machine's memory.
+    """
 
     start: float
     periods: int
@@ -73,7 +76,7 @@ class Spectra:
 
     @property
     def band(self) -> tuple[float, float]:
-        """Lowest and highest frequency [Hz] that the input reaches: mean power above 1 % of its greatest.
+        """Lowest and highest frequency [Hz] of the input: mean power above 1 % of its maximum.
 
         Raises InputError when there is no input.
         """
@@ -90,8 +93,8 @@ class Spectra:
 def steady_window(record: Record, period: float, ring_down: float) -> Window:
     """The longest window of whole periods [s] whose command repeats, after a warm-up of twelve ring-downs [s].
 
-    The warm-up is cut to a quarter of the record where the machine rings longer. Raises InputError when the record is
-    shorter than a period.
+    The warm-up is limited to a quarter of the record where the ring-down is longer. Raises InputError when the
+    record is shorter than a period.
     """
     output, command = record.output, record.input
     low, high = float(output.time[0]), float(output.time[-1]) + output.period
@@ -118,7 +121,7 @@ def steady_window(record: Record, period: float, ring_down: float) -> Window:
     leakage = np.array(
         [np.sqrt(np.average((value(high - 1e-6 - n * period - back) - at_end) ** 2, weights=weight)) for n in counts]
     ) / size  # fmt: skip
-    # the chirps' samples fall a little differently in each repetition
+    # the chirps' samples fall at slightly different phases in each repetition
     good = np.flatnonzero(leakage < 1e-2)
     best = int(good[0]) if len(good) else int(np.argmin(leakage)) if leakage.min() < 0.5 * leakage[0] else 0
     count = int(counts[best])
@@ -126,7 +129,7 @@ def steady_window(record: Record, period: float, ring_down: float) -> Window:
 
 
 def _on_sample(channel: Channel, time: float) -> float:
-    """The last sample time that is not after `time` [s] (to a nanosecond)."""
+    """The last sample time not after `time` [s] (to a nanosecond)."""
     return float(channel.time[max(0, np.searchsorted(channel.time, time + 1e-9, side="right") - 1)])
 
 
@@ -139,7 +142,7 @@ def _input_integral(record: Record, window: Window, period: float, bins: int) ->
     highest = 2.0 * np.pi * bins / length
     cells = fast_length(max(2 * bins + 2, int(np.ceil(length * highest / FINE))))
     edges = window.start + np.linspace(0.0, length, cells + 1)
-    if record.hold == "zero":  # the integral of a held signal is a broken line
+    if record.hold == "zero":  # the integral of a held signal is piecewise linear
         total = np.concatenate([[0.0], np.cumsum(command.value[:-1] * np.diff(command.time))])
         integral = np.interp(edges, command.time, total)
         late = edges > command.time[-1]
@@ -147,11 +150,12 @@ def _input_integral(record: Record, window: Window, period: float, bins: int) ->
     else:
         integral = continuous(command.time, command.value, record.hold).antiderivative()(edges)
     spectrum = np.fft.rfft(np.diff(integral))[: bins + 1]
-    return spectrum * np.exp(-1j * np.pi * np.arange(bins + 1) / cells)  # a cell stands for its middle
+    return spectrum * np.exp(-1j * np.pi * np.arange(bins + 1) / cells)  # a cell represents its midpoint
 
 
 def highest_input(record: Record) -> float:
-    """Frequency [Hz] up to which the input has power (1e-6 of its greatest density is neglected); 0 for none, or one that never changes."""
+    """Frequency [Hz] up to which the input has power (1e-6 of its greatest density is neglected); 0 for none or a
+    constant one."""
     command = record.input
     if command is None or len(command) < 8 or not np.any(command.value):
         return 0.0
@@ -173,9 +177,9 @@ def spectra(
 ) -> Spectra:
     """Spectra of a record up to `sidebands` pumping frequencies above its input's band.
 
-    `ring_down` [s] of the machine decides the warm-up; `cycle` harmonics of the limit cycle are kept. The output is
-    interpolated to whole samples a period (its own samples where they are that already). Raises InputError when the
-    record is too short.
+    `ring_down` [s] of the machine determines the warm-up; `cycle` harmonics of the limit cycle are kept. The output
+    is interpolated to a whole number of samples per period (its own samples where that holds already). Raises
+    InputError when the record is too short.
     """
     period = pumping.period
     chosen = window or steady_window(record, period, ring_down)

@@ -1,4 +1,4 @@
-"""An angle that is read within one turn, or half of one, and jumps from one end to the other where it passes the end: the jumps taken out."""
+"""Unwrapping of an angle that is read within a turn, or half a turn, and jumps between the ends of that range."""
 
 import math
 from dataclasses import replace
@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
-TURNS = {"2π": 2.0 * math.pi, "π": math.pi}  # rad: half a turn is what an arc tangent of a ratio tells
+TURNS = {"2π": 2.0 * math.pi, "π": math.pi}  # [rad]; half a turn is the range of an arc tangent of a ratio
 
 
 def unwrapped(record: Record) -> Record:
-    """The record with an output that goes on where it jumped by a turn, and references that jump like it likewise."""
+    """The record with an unwrapped output; references that jump in the same way are unwrapped, too."""
     turn = turn_of(record)
     if turn == 0.0:
         return record
@@ -23,7 +23,7 @@ def unwrapped(record: Record) -> Record:
     if reference is None or reference.unit != record.output.unit or not len(wraps_by(reference.value, turn)):
         return found
     asked = _unwrapped(reference, turn)
-    # a reference is of the turn in which the machine is
+    # move the reference to the turn in which the machine is
     apart = float(np.median(np.interp(asked.time, output.time, output.value) - asked.value))
     asked = replace(asked, value=asked.value + turn * np.rint(apart / turn))
     return replace(found, **{"input" if record.input_kind == "reference" else "reference": asked})
@@ -34,13 +34,14 @@ def _unwrapped(channel: Channel, turn: float) -> Channel:
 
 
 def wrap_notes(record: Record) -> tuple[str, ...]:
-    """A line on an output that jumps by a turn or half of one; none where it does not."""
+    """A line on an output that jumps by a turn or half a turn; empty where it does not."""
     said = wraps_of(record)
     return () if said is None else (f"output: {said}",)
 
 
 def wraps_of(record: Record) -> str | None:
-    """By what an output jumps that is read within a turn or half of one, in one sentence; None where it does not."""
+    """The size of the jumps of an output that is read within a turn or half a turn, in one sentence; None where it
+    does not jump."""
     turn = turn_of(record)
     if turn == 0.0:
         return None
@@ -53,18 +54,19 @@ def wraps_of(record: Record) -> str | None:
 
 
 def turn_of(record: Record) -> float:
-    """The turn [rad] by which an output jumps that is read within one; 0 where it does not."""
+    """The turn [rad] by which an output that is read within one jumps; 0 where it does not."""
     if record.output_kind != "position" or record.output.unit != "rad":
         return 0.0
     return next((turn for turn in TURNS.values() if len(wraps_by(record.output.value, turn))), 0.0)
 
 
 def wraps_by(value: Array, turn: float) -> NDArray[np.intp]:
-    """Steps (m,) of the values (n,) that are jumps by a turn; none where any jump is something else.
+    """Indices (m,) of the steps of the values (n,) that are jumps by a turn; empty where any jump is something else.
 
-    A jump is a turn less what the angle moves meanwhile, which is no more than in any other step, and the angle moves on against it.
+    A jump is a turn minus the motion during the step. That motion is no larger than in other steps, and it goes in
+    the direction opposite to the jump.
     """
-    places = np.flatnonzero(np.diff(value))  # where it is held between its readings it does not move
+    places = np.flatnonzero(np.diff(value))  # repeated values between readings are no motion
     step = np.diff(value)[places]
     jump = np.abs(step) > 0.5 * turn
     if not jump.any() or jump.all():

@@ -31,11 +31,11 @@ class Bag:
     ----------
     files : storage files in the order of recording.
     topics : all topics by name, with or without messages.
-    truncated : whether the recording breaks off (its recorder was killed or is still running).
-    notes : what a user should know about the state of the files, one line each; empty for a whole recording.
-    stated : messages by topic, as metadata.yaml or the end of the files count them; empty where they do not.
+    truncated : whether the recording ends abruptly (its recorder was killed or is still running).
+    notes : messages about the state of the files, one line each; empty for a complete recording.
+    stated : number of messages by topic, from metadata.yaml or the end of the files; empty where they do not state it.
 
-    With `verify` the checksums of the files are compared, too. Raises InputError when there is no such recording.
+    With `verify` the checksums of the files are compared. Raises InputError when there is no such recording.
     """
 
     def __init__(self, path: str | Path, verify: bool = False) -> None:
@@ -128,7 +128,7 @@ class Bag:
             self.notes.append(f"{file.name}: breaks off; what precedes the break was read")
 
     def lost(self, counts: Mapping[str, int]) -> dict[str, int]:
-        """Messages by topic that are missing from `counts`, as far as the bag states how many there were."""
+        """Number of messages by topic that are missing from `counts`, as far as the bag states the total."""
         return {
             name: missing
             for name, stated in self.stated.items()

@@ -1,4 +1,4 @@
-"""Data-quality report of a recording: every topic's rate, jitter, gaps and lateness, and the mapped channels."""
+"""Data-quality report of a recording: rate, jitter, gaps and lateness of every topic, and the mapped channels."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -29,12 +29,12 @@ from rhythmid.record.timing import Timing
 from rhythmid.record.two_clocks import read_clock_notes
 from rhythmid.record.unsigned import unsigned_notes
 
-MEGABYTE = 1e6  # bytes; what is smaller is told in kB
+MEGABYTE = 1e6  # bytes; smaller sizes are given in kB
 
 
 @dataclass(frozen=True)
 class TopicReport:
-    """One topic: its type, the timing of its receive times and of its header stamps, and receive minus stamp [s]."""
+    """One topic: its type, the timing of its receive times and of its header stamps, and receive time minus stamp [s]."""
 
     name: str
     type: str
@@ -71,18 +71,18 @@ class BagReport:
 
     Attributes
     ----------
-    path, size : where it is and how large [bytes]; of tables the files that are read.
+    path, size : location and size [bytes]; for tables, of the files that are read.
     duration : from the first to the last message received [s].
     topics : one report each, in order of name; empty for tables.
     channels : quality of the mapped channels by role; empty if they cannot be read.
-    problems : why the recording cannot be used as mapped, one line each; empty if it can.
-    notes : what a user should know of the recording, one line each.
-    damage : those of the notes that tell damage of the files; empty for a whole recording.
+    problems : reasons why the recording cannot be used as mapped, one line each; empty if it can.
+    notes : messages about the recording, one line each.
+    damage : the notes about damage of the files; empty for a complete recording.
     record : what could be read; None if it cannot be used as mapped.
-    left_out : samples that no analysis will use, one entry for each reason; the notes tell of them, too.
-    assumed : those of the notes that tell what the signals.yaml takes for granted.
-    columns : how many columns of tables are read, the time's too; 0 for a bag.
-    cut : the record as an analysis will take it, cut where commands are missing; None if it cannot be used.
+    left_out : samples that no analysis will use, one entry for each reason; the notes state them as well.
+    assumed : the notes about assumptions of the signals.yaml.
+    columns : number of table columns that are read, including the time; 0 for a bag.
+    cut : the record as an analysis uses it, cut where commands are missing; None if it cannot be used.
     """
 
     path: Path
@@ -102,7 +102,7 @@ class BagReport:
 
     @property
     def remarks(self) -> list[str]:
-        """What deserves mention of a recording that can be used, one line each."""
+        """Remarks on a recording that can be used, one line each."""
         complaints = [
             f"{role}: {one}" for role, channel in self.channels.items() for one in channel.complaints()
         ]
@@ -110,7 +110,7 @@ class BagReport:
 
     @property
     def matters(self) -> list[str]:
-        """Those of the remarks by which an answer may change, one line each: what `check --strict` fails on."""
+        """The remarks that may change a result, one line each: `check --strict` fails on them."""
         complaints = [
             f"{role}: {one}" for role, channel in self.channels.items() for one in channel.matters()
         ]
@@ -118,7 +118,7 @@ class BagReport:
 
     @property
     def usable(self) -> bool:
-        """Whether a record can be read from it."""
+        """Whether a record can be read from the recording."""
         return not self.problems
 
     def to_dict(self) -> dict[str, Any]:
@@ -168,7 +168,7 @@ class BagReport:
         return found
 
     def _verdict(self, role: str, channel: ChannelQuality) -> str:
-        """What deserves mention of a channel; "flawless" where nothing does, of it or of the recording."""
+        """Remark on a channel; "flawless" where there is none on it or on the recording."""
         said = channel.complaints()
         if role == "output" and self.left_out:
             said.append(f"{sum(one.count for one in self.left_out)} samples are left out")
@@ -182,10 +182,12 @@ class BagReport:
 def quality_report(
     source: str | Path, signals: Signals | JointSignals | str | Path | None = None
 ) -> BagReport:
-    """Report on a bag, or on the tables that a signals.yaml names; of several joints all channels, by "joint.role".
+    """Report on a bag, or on the tables that a signals.yaml names. For several joints it has all channels, by
+    "joint.role".
 
-    It tells what analyses will leave out of the record and where they will cut it. What makes the recording unusable as a record is
-    reported, not raised: InputError is left for a source that is no recording at all.
+    The report states what analyses will leave out of the record and where they will cut it. Problems that make the
+    recording unusable as a record are reported, not raised: InputError is raised only for a source that is no
+    recording.
     """
     source = Path(source)
     if isinstance(signals, (str, Path)):
@@ -208,7 +210,7 @@ def quality_report(
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]
-            wrapped = wrap_notes(one)  # are taken out, and change no answer
+            wrapped = wrap_notes(one)  # they are removed and change no result
             assumed += [*one.quality.assumed, *(f"{begin or f'{one.name}: '}{note}" for note in wrapped)]
             notes += [f"{begin}{note}" for note in (*copy_notes(one), *unsigned_notes(one))]
             notes += [f"{begin}{note}" for note in (*wrapped, *rest_notes(one)) if begin]
@@ -263,7 +265,7 @@ def quality_report(
 
 
 def _tables(source: Path, signals: Signals | JointSignals | None) -> tuple[int, int]:
-    """Size [bytes] of the tables that are read, and how many of their columns."""
+    """Size [bytes] of the tables that are read, and number of columns that are read."""
     if source.suffix in (".yaml", ".yml"):
         signals = JointSignals.load(source) if names_joints(source) else Signals.load(source)
     if isinstance(signals, JointSignals):
@@ -277,7 +279,7 @@ def _tables(source: Path, signals: Signals | JointSignals | None) -> tuple[int, 
 
 
 def _times(bag: Bag) -> tuple[dict[str, NDArray[np.int64]], dict[str, Columns]]:
-    """Receive times [ns] of every topic, and the columns of those whose messages bear a stamp."""
+    """Receive times [ns] of every topic, and the columns of topics whose messages have a stamp."""
     received: dict[str, list[NDArray[np.int64]]] = {}
     for block in bag.blocks():
         received.setdefault(block.topic.name, []).append(block.log_ns)
@@ -287,7 +289,7 @@ def _times(bag: Bag) -> tuple[dict[str, NDArray[np.int64]], dict[str, Columns]]:
             if stamp_path(topic) is not None:
                 stamped |= read_columns(_only(Bag(bag.path), name), {name: []})
         except InputError:
-            continue  # of unknown type or damaged: its receive times still count
+            continue  # unknown type or damaged: only its receive times are used
     return {name: np.concatenate(parts) for name, parts in received.items()}, stamped
 
 
@@ -296,7 +298,7 @@ def _only(bag: Bag, name: str) -> Iterator[Block]:
 
 
 def _is_without_times(columns: Columns) -> bool:
-    """Whether all stamps of messages are zero, as where a node does not set them."""
+    """Whether all message stamps are zero, as from a node that does not set them."""
     return columns.stamp_ns is not None and len(columns.stamp_ns) > 0 and not columns.stamp_ns.any()
 
 

@@ -1,4 +1,4 @@
-"""Bags written: rosbag2 directories with MCAP or sqlite3 storage, complete or not at all."""
+"""Writer of bags: rosbag2 directories with MCAP or sqlite3 storage, written completely or not at all."""
 
 import json
 import os
@@ -35,13 +35,13 @@ from rhythmid.record.sqlite_writer import SqliteWriter
 Storage = Literal["mcap", "sqlite3"]
 _FILES = {StoragePlugin.MCAP: McapWriter, StoragePlugin.SQLITE3: SqliteWriter}
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
-FOREVER = QosTime(9223372036, 854775807)  # how rosbag2 writes an infinite duration
+FOREVER = QosTime(9223372036, 854775807)  # rosbag2's notation of an infinite duration
 
 
 class BagWriter(Writer):
-    """rosbags' Writer with storages that also take arrays, and with files that can be split.
+    """rosbags' Writer, extended by storages that accept arrays and by files that can be split.
 
-    `numbered` names the files as rosbag2's recorder does (`bag_0.mcap`, …); without it there is one, `bag.mcap`.
+    `numbered` names the files as rosbag2's recorder does (`bag_0.mcap`, …); without it there is one file, `bag.mcap`.
     `ros_distro` is the ROS distribution that metadata.yaml names.
     """
 
@@ -59,7 +59,7 @@ class BagWriter(Writer):
 
     @property
     def file(self) -> FileContent:
-        """What has been written to the present file."""
+        """Content written so far to the current file."""
         return self.files[-1]
 
     def open(self) -> None:
@@ -77,7 +77,7 @@ class BagWriter(Writer):
         self.files.append(FileContent(storage.path.name))
 
     def split(self) -> None:
-        """Close the present file and go on in another."""
+        """Close the current file and continue in a new one."""
         self._close_file([self.file])
         self._open_file()
         assert self.storage is not None
@@ -88,7 +88,7 @@ class BagWriter(Writer):
             self.storage.add_connection(connection, qos_text(connection.ext.offered_qos_profiles))
 
     def flush(self) -> None:
-        """Make everything written so far readable, should the process be killed."""
+        """Make all data written so far readable, even if the process is killed."""
         cast(McapWriter | SqliteWriter, self.storage).flush()
 
     def write(self, connection: Connection, timestamp: int, data: bytes | memoryview) -> None:
@@ -108,7 +108,7 @@ class BagWriter(Writer):
                 self.file.add(number, int(log_ns.min()), int(log_ns.max()), len(log_ns), data.size)
 
     def close(self) -> None:
-        """Close the last file and write metadata.yaml, with which the bag is complete."""
+        """Close the last file and write metadata.yaml, which completes the bag."""
         self._close_file(self.files)
         text = metadata_text(self._information(self.files))
         unfinished = self.metapath.with_suffix(".yaml.tmp")
@@ -126,7 +126,8 @@ class BagWriter(Writer):
 
 
 def qos(transient_local: bool = False, depth: int = 100) -> Qos:
-    """Quality of service that the nodes offer: reliable, the last `depth` messages; kept for late joiners or not."""
+    """Quality of service of the nodes: reliable, the last `depth` messages; with `transient_local` kept for late
+    joiners."""
     durability = QosDurability.TRANSIENT_LOCAL if transient_local else QosDurability.VOLATILE
     return Qos(
         QosHistory.KEEP_LAST, 1 if transient_local else depth, QosReliability.RELIABLE, durability,
@@ -142,7 +143,7 @@ def add_topic(writer: Writer, topic: str, msgtype: str, transient_local: bool = 
 
 @contextmanager
 def new_bag(path: str | Path, storage: Storage = "mcap", compress: bool = False) -> Iterator[BagWriter]:
-    """A bag being written. It appears under `path` when the block ends without an exception, and never otherwise.
+    """Context of a new bag. It appears under `path` when the block ends without an exception, and never otherwise.
 
     Raises InputError when `path` exists, its folder cannot be written, or `storage` is unknown.
     """

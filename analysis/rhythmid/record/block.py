@@ -1,4 +1,4 @@
-"""Serialised messages as they lie in a bag: one buffer and where in it each message stands."""
+"""Serialised messages in the form of a bag: one buffer, and the position of each message in it."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,14 +18,15 @@ class Topic:
     encoding: str = "cdr"
     definition: str = ""
     definition_format: str = ""  # "ros2msg", "ros2idl" or ""
-    qos: str = ""  # offered QoS profiles, YAML, as the bag stores them
+    qos: str = ""  # offered QoS profiles, YAML, as stored in the bag
 
 
 Wanted = Callable[[Topic], bool]
 
 
 def gather(buffer: bytes | memoryview, at: NDArray[np.int64], dtype: DTypeLike) -> NDArray:
-    """Numbers of `dtype` at the byte offsets `at`, int64[n], aligned or not. Raises ValueError where one is outside."""
+    """Numbers of `dtype` at the byte offsets `at`, int64[n], aligned or not. Raises ValueError where one is outside
+    the buffer."""
     item = np.dtype(dtype)
     if len(at) and not 0 <= at.min() <= at.max() <= len(buffer) - item.itemsize:
         raise ValueError("a number would lie outside of the file")
@@ -37,7 +38,7 @@ def gather(buffer: bytes | memoryview, at: NDArray[np.int64], dtype: DTypeLike) 
 class Block:
     """Messages of one topic in the order in which they were recorded.
 
-    `start` and `size` give each message's bytes in `buffer`, `log_ns` when it was received [ns]; all int64[n].
+    `start` and `size` give each message's bytes in `buffer`, `log_ns` its receive time [ns]; all int64[n].
     """
 
     topic: Topic
@@ -57,7 +58,7 @@ class Block:
     def plain(self) -> "Block":
         """The block with every message decompressed, where messages are compressed one by one.
 
-        No CDR message begins like a zstd frame, so the bytes themselves tell. Raises ValueError on damage.
+        No CDR message begins like a zstd frame, so the bytes themselves show it. Raises ValueError on damage.
         """
         if not len(self) or bytes(self.buffer[self.start[0] : self.start[0] + 4]) != ZSTD_MAGIC:
             return self
@@ -74,7 +75,8 @@ def by_topic(
     size: NDArray[np.int64],
     log_ns: NDArray[np.int64],
 ) -> Iterator[Block]:
-    """Split messages, `number` telling the topic of each, into one block a topic; others are left out."""
+    """Split messages into one block per topic. `number` is the topic of each message; messages of other topics are
+    left out."""
     for key, topic in topics.items():
         mine = np.flatnonzero(number == key)
         if len(mine):

@@ -1,4 +1,5 @@
-"""Cleaning: a record without the samples of its output that do not say where the machine was. Every analysis begins with it."""
+"""Cleaning: removes samples of the output that do not show the machine's position. It is the first step of every
+analysis."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -17,15 +18,16 @@ from rhythmid.record.rest_at_ends import rest_notes
 
 Mask = NDArray[np.bool_]
 Reason = Literal["outlier", "repeated", "clipped"]
-MOSTLY = 0.5  # share of clipped samples beyond which a record is useless
-# times the range of all other samples, from which a lone peak of an acceleration is beyond what an impact makes beside its own ringing
+MOSTLY = 0.5  # share of clipped samples above which a record is unusable
+# ratio of a single acceleration peak to the range of all other samples, above which it cannot be an impact with its
+# ringing
 BEYOND = 10.0
 WORDS: dict[Reason, str] = {
     "outlier": "stand far off their neighbours",
     "repeated": "repeat the one before while the motion goes on",
     "clipped": "are clipped{at}, or neighbours of such,",
 }
-# outliers come first: one beyond a sensor's limit would hide it
+# outliers come first: an outlier beyond a sensor's limit would hide the clipping
 FINDERS: tuple[tuple[Reason, Callable[[NDArray[np.float64]], Mask]], ...] = (
     ("outlier", outlying_samples),
     ("repeated", repeated_samples),
@@ -35,8 +37,8 @@ FINDERS: tuple[tuple[Reason, Callable[[NDArray[np.float64]], Mask]], ...] = (
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Samples of an output that are left out for one reason: `count` of `total`, the first at `first` [s]; where they are clipped, at
-    which `limits`, in words."""
+    """Samples of an output that are left out for one reason: `count` of `total`, the first at `first` [s]; for
+    clipped samples the `limits`, in words."""
 
     reason: Reason
     count: int
@@ -66,7 +68,7 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class Cleaned:
-    """A record as it is analysed, what was left out of it, and what else is to be told of its output."""
+    """A cleaned record, the samples that were left out, and further messages about its output."""
 
     record: Record
     left_out: tuple[LeftOut, ...]
@@ -74,7 +76,7 @@ class Cleaned:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out and what else is to be told, one line each."""
+        """Messages about left-out samples and the output, one line each."""
         return tuple(f"{self.record.name}: {words}" for words in self.words)
 
     @property
@@ -84,10 +86,11 @@ class Cleaned:
 
 
 def cleaned(record: Record) -> Cleaned:
-    """The record without outliers, repeated and clipped samples of the output, and without jumps of an angle that is read within a turn.
+    """The record without outliers, repeated and clipped samples of the output, and with angles unwrapped.
 
-    An acceleration keeps its outliers: impacts do make such peaks there. With clipped samples go their neighbours, which are often
-    half clipped by the sensor's own averaging. Raises InputError when most of the record is clipped.
+    An acceleration keeps its outliers, because impacts do cause such peaks. The neighbours of clipped samples are
+    left out, too: the sensor's own averaging often clips half of them. Raises InputError when most of the record is
+    clipped.
     """
     total, found, wraps = len(record.output), [], wrap_notes(record)
     record = unwrapped(record)
@@ -111,7 +114,8 @@ def cleaned(record: Record) -> Cleaned:
 
 
 def peak_note(record: Record) -> str | None:
-    """What to tell of lone peaks of an acceleration, which are kept, that are far beyond all that it is else; None where there are none."""
+    """Message about single acceleration peaks that are far above the other values and are kept; None where there
+    are none."""
     value = record.output.value
     if record.output_kind != "acceleration" or not (peaks := outlying_samples(value)).any():
         return None
@@ -127,7 +131,7 @@ def peak_note(record: Record) -> str | None:
 
 
 def cleaned_joints(records: Sequence[JointRecord]) -> tuple[list[JointRecord], tuple[str, ...]]:
-    """The recordings of a machine, each joint's record cleaned, and what was left out or is to be told, one line each."""
+    """The recordings of a machine with each joint's record cleaned, and messages about it, one line each."""
     made, notes = [], []
     for whole in records:
         joints = {joint: cleaned(record) for joint, record in whole.joints.items()}

@@ -1,8 +1,9 @@
-"""Skew of clocks: by how much faster the clock that stamps a channel runs than the one that receives it.
+"""Clock skew: rate of the clock that stamps a channel relative to the clock of the receiver.
 
-Seen in how long messages are under way, receipt less stamp, which grows or shrinks steadily where the clocks run apart. Single
-messages are held up, most of them little: each stretch of the recording is told by its median, as by the least delays in S. B.
-Moon, P. Skelly, D. Towsley, Proc. IEEE INFOCOM (1999) 227, and the scatter of the medians about the line tells how sure it is.
+It is measured by the latency of messages, receive time minus stamp, which grows or shrinks steadily with the skew.
+Single messages are held up, most of them only a little. Each stretch of the recording is represented by its median;
+S. B. Moon, P. Skelly, D. Towsley, Proc. IEEE INFOCOM (1999) 227, use the least delays. The scatter of the medians
+about the line gives the uncertainty.
 """
 
 import math
@@ -11,21 +12,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-STRETCHES = 30  # of a recording, one median each
-SAMPLES_OF_A_STRETCH = 20  # samples of a stretch
-STAMP_RESOLUTION = 1e-9  # s; what stamps are whole multiples of, so that no skew is known better than this over the recording
+STRETCHES = 30  # stretches of a recording, with one median each
+SAMPLES_OF_A_STRETCH = 20  # least number of samples of a stretch
+# [s] resolution of stamps: no skew is known better than this over the length of the recording
+STAMP_RESOLUTION = 1e-9
 
 
 @dataclass(frozen=True)
 class ClockSkew:
-    """How much faster the stamps run than the clock of receipt, `rate` [s/s], and its standard deviation `std` [s/s]."""
+    """Rate `rate` [s/s] by which the stamping clock is faster than the receiver's clock, and its standard deviation
+    `std` [s/s]."""
 
     rate: float
     std: float
 
 
 def clock_skew(time: NDArray[np.float64], lateness: NDArray[np.floating]) -> ClockSkew | None:
-    """Skew from stamps (n,) [s] and what they are older than their receipt (n,) [s]; None of too short a recording."""
+    """Skew from stamps (n,) [s] and latencies, receive time minus stamp, (n,) [s]; None for a recording that is too
+    short."""
     if len(time) < STRETCHES * SAMPLES_OF_A_STRETCH or np.ptp(time) == 0.0:
         return None
     middle = [float(np.median(part)) for part in np.array_split(time, STRETCHES)]

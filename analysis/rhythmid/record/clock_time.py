@@ -1,4 +1,4 @@
-"""Dates, times of day and durations, as programs write them into a table, in seconds."""
+"""Dates, times of day and durations in tables, converted to seconds."""
 
 import re
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from rhythmid.record.heading import heading_of
 Array = NDArray[np.float64]
 DAY = 86400.0  # s
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
-CENTURY = 2000  # of a year that is written with two digits
+CENTURY = 2000  # century of a two-digit year
 OF_DAY = r"(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)\s*([ap]\.?m\.?)?"
 DATED = re.compile(
     rf"(\d{{1,4}})[./-](\d{{1,2}}|[a-z]{{3}})[a-z]*[./-](\d{{1,4}})[ t,]\s*{OF_DAY}", re.IGNORECASE
@@ -25,11 +25,12 @@ LASTING = re.compile(r"([+-]?[\d.]+(?:e[+-]?\d+)?)\s*([a-zµ]+)", re.IGNORECASE)
 
 
 def seconds(cells: Sequence[str]) -> Array | None:
-    """Seconds (n,) of cells that all hold a date and time (ISO 8601 and national forms; since 1970, without a zone in UTC), all a time
-    of day (since the first day's midnight), all minutes and seconds, or all a duration with its unit. None where one holds neither.
+    """Seconds (n,) of cells that are all in one form; None where a cell is in none.
 
-    A day ends where a time of day goes back by more than half a day. Where day and month could change places, the record is taken to
-    be the shorter one of the two.
+    The forms are: date and time (ISO 8601 and national forms; seconds since 1970, UTC where no zone is given), time
+    of day (since the first day's midnight), minutes and seconds, and a duration with its unit. A new day starts
+    where a time of day goes back by more than half a day. Where day and month could be exchanged, the order that
+    gives the shorter record is taken.
     """
     for read in (_since_1970, _dated, _since_midnight, _elapsed, _lasting):
         try:
@@ -46,11 +47,12 @@ def _since_1970(cells: Sequence[str]) -> Array:
 
 
 def _dated(cells: Sequence[str]) -> Array:
-    """Of forms such as 05.01.2024 12:00:00,5, 1/5/2024 12:00:00 PM, 05-Jan-2024 12:00:00 and 2024/01/05 12:00:00."""
+    """Seconds (n,) of forms such as 05.01.2024 12:00:00,5, 1/5/2024 12:00:00 PM, 05-Jan-2024 12:00:00 and
+    2024/01/05 12:00:00."""
     parts = [_match(DATED, cell) for cell in cells]
     of_day = np.array([_of_day(*part[3:]) for part in parts])
     days: list[Array] = []
-    for order in ((0, 1, 2), (2, 1, 0), (2, 0, 1)):  # where year, month and day stand
+    for order in ((0, 1, 2), (2, 1, 0), (2, 0, 1)):  # positions of year, month and day
         try:
             days.append(DAY * np.array([_days(*(part[place] for place in order)) for part in parts]))
         except ValueError:
@@ -61,7 +63,7 @@ def _dated(cells: Sequence[str]) -> Array:
 
 
 def _days(year: str, month: str, day: str) -> int:
-    """Days since 1970. Raises ValueError where there is no such day."""
+    """Days since 1970. Raises ValueError for a day that does not exist."""
     if len(year) not in (2, 4) or len(day) > 2:
         raise ValueError
     number = MONTHS.index(month.lower()) + 1 if month.isalpha() else int(month)
@@ -98,7 +100,7 @@ def _elapsed(cells: Sequence[str]) -> Array:
 
 
 def _lasting(cells: Sequence[str]) -> Array:
-    """Of durations with their unit, as MATLAB writes them: 0.01 sec."""
+    """Seconds (n,) of durations with a unit, as MATLAB writes them: 0.01 sec."""
     parts = [_match(LASTING, cell) for cell in cells]
     units = {unit: heading_of(f"t [{unit}]") for _, unit in parts}
     if any(one.unit != "s" for one in units.values()):

@@ -1,18 +1,19 @@
-"""What the times of channels tell of their clocks, and what has to be assumed."""
+"""Messages about the clocks of channels, and the assumptions made about them."""
 
 import math
 from collections.abc import Mapping
 
 from rhythmid.record.quality import ChannelQuality
 
-# seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
+# [s] difference of two channels' latencies above which their stamps hardly come from one clock
 CLOCKS_APART = 1.0
-APART_BY = 5.0  # standard deviations from which two clocks are said to run apart
-WORTH_TELLING = 0.1  # of a sample period by which they do over a record, below which it matters to no delay
+APART_BY = 5.0  # standard deviations above which two clocks are reported to drift apart
+WORTH_TELLING = 0.1  # drift over a record in sample periods; a smaller one affects no delay
 
 
 def clock_notes(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
-    """Notes on the clocks of channels by role; `clocks` says whether their times are those of `header` or `receive`."""
+    """Notes on the clocks of channels by role; `clocks` says for each channel whether its times are `header` or
+    `receive` times."""
     return (
         *_different(channels),
         *assumed_clock(channels, clocks),
@@ -33,7 +34,7 @@ def _different(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
 
 
 def assumed_clock(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
-    """What is assumed where some channels have the times of their stamps and others those of their receipt."""
+    """Assumption where some channels use stamps as times and others receive times."""
     if set(clocks.values()) != {"header", "receive"}:
         return ()
     received = " and ".join(role for role, kind in clocks.items() if kind == "receive")
@@ -46,7 +47,7 @@ def assumed_clock(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, s
 
 
 def _running_apart(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
-    """Notes on channels whose times run apart from those of the output, as their arrivals tell."""
+    """Notes on channels whose clock drifts relative to that of the output, according to receive times."""
     rates = {role: _rate(channel, clocks.get(role)) for role, channel in channels.items()}
     own = rates.get("output")
     if own is None:
@@ -66,14 +67,14 @@ def _running_apart(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, 
 
 
 def _rate(channel: ChannelQuality, clock: str | None) -> tuple[float, float] | None:
-    """By how much faster than the clock of receipt a channel's times run [s/s], with the standard deviation."""
+    """Rate [s/s] by which a channel's times run faster than the receiver's clock, with its standard deviation [s/s]."""
     if clock == "receive":
         return 0.0, 0.0
     return None if channel.skew is None or channel.skew_std is None else (channel.skew, channel.skew_std)
 
 
 def _jittered(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
-    """A note for a channel whose stamps are out by so much that its noise grows with the slope of the signal."""
+    """A note for a channel with so much timestamp jitter that its noise grows with the slope of the signal."""
     return tuple(
         f"{role}: the stamps jitter by {1e3 * channel.stamp_jitter:.3g} ± {1e3 * channel.stamp_jitter_std:.1g} ms; samples count for "
         "less the faster the signal changes"

@@ -1,5 +1,5 @@
-"""Traces as the editor of CODESYS writes them as text: keys with their values, and below `0.Data`, `1.Data` … the times and values of each
-variable, one below the other."""
+"""Traces exported as text by the CODESYS editor: keys with values, and below `0.Data`, `1.Data` … the times and
+values of each variable, one after the other."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 from rhythmid.record.text_cells import number_of
 
 VARIABLE = re.compile(r"\d+\.Variable;\s*(\S.*?)\s*")
-SAMPLE = ";"  # what a line of a time and a value begins with
+SAMPLE = ";"  # separator in a line with a time and a value
 TIME = "time"
 
 
 def is_trace(lines: Iterable[str]) -> bool:
-    """Whether a file that begins with these lines is a trace."""
+    """Whether a file that begins with these lines is a CODESYS trace."""
     return any(VARIABLE.fullmatch(line.rstrip("\r\n")) for line in lines)
 
 
 def read_trace(lines: Iterable[str]) -> dict[str, NDArray[np.float64]]:
-    """The times of all samples, in order, and the variables by name, NaN where one has no sample; float64[n] each.
+    """The times of all samples, in order, and the variables by name; float64[n] each, NaN where a variable has no sample.
 
-    Raises ValueError where a line of samples is damaged.
+    Raises ValueError where a line with samples is damaged.
     """
     found: dict[str, dict[float, float]] = {}
     samples: dict[float, float] = {}

@@ -1,4 +1,5 @@
-"""Fields of a bag's messages as arrays: by layout where all messages of a block have the same, one by one elsewhere."""
+"""Fields of a bag's messages as arrays: read by layout where all messages of a block have the same layout,
+otherwise one by one."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,12 +21,12 @@ class Columns:
 
     Attributes
     ----------
-    log_ns : int64[n], when each message was received [ns].
+    log_ns : int64[n], receive time of each message [ns].
     stamp_ns : int64[n], its header's stamp [ns]; None if the type has none.
     values : field -> float64[n]; NaN also where `missing`.
-    missing : field -> bool[n], whether the message has no such entry (a joint that it does not list).
-    reason : field -> why the first message without the entry has none.
-    singly : number of messages that had to be deserialised one by one.
+    missing : field -> bool[n], whether the message lacks the entry (a joint that it does not list).
+    reason : field -> why the first message without the entry lacks it.
+    singly : number of messages that were deserialised one by one.
     """
 
     topic: Topic

@@ -11,13 +11,14 @@ else:
     from backports import zstd
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-HARMLESS = 256 << 20  # bytes that any file may hold, however small it is when packed
-EXPANSION = 200  # times its packed size that a larger one may hold; recordings of constants reach some 50
+HARMLESS = 256 << 20  # bytes that any file may unpack to, however small it is packed
+EXPANSION = 200  # largest expansion ratio of a larger file; recordings of constants reach about 50
 _PIECE = 1 << 20  # bytes written at once
 
 
 def largest(packed: int) -> int:
-    """How many bytes may come out of `packed` compressed ones: what holds more was made to fill the memory."""
+    """Largest allowed size [bytes] of `packed` compressed bytes after unpacking: more would be an attempt to fill
+    the memory."""
     return max(HARMLESS, EXPANSION * packed)
 
 
@@ -29,7 +30,7 @@ def compress(data: bytes) -> bytes:
 def decompress(data: bytes, method: str) -> bytes:
     """Decompress a chunk; `method` as MCAP names it: '' (none), 'zstd' or 'lz4'.
 
-    A frame that breaks off gives what precedes the break. Raises ValueError when `data` is no such frame, or holds more than
+    A truncated frame gives the data before its end. Raises ValueError when `data` is no such frame, or holds more than
     `largest` allows.
     """
     if method == "":

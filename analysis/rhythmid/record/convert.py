@@ -1,4 +1,4 @@
-"""A record as a bag: its channels as joint states, with the signals.yaml by which they are read back."""
+"""Writes a record as a bag: its channels as joint states, with a signals.yaml that reads them back."""
 
 import math
 import re
@@ -19,16 +19,17 @@ TOPICS = {
     "input": "joint_commands",
     "forcing": "forcing",
     "reference": "reference",
-}  # of roles that are no state
-RUN_CLOCK = 9.0  # s; times that begin before are kept, as a bag's reader takes such a clock for one that began with the run
+}  # roles that are no state
+# [s] earlier first times are kept: a bag's reader takes such a clock for one that started with the run
+RUN_CLOCK = 9.0
 
 
 def write_record(record: Record, path: str | Path, joint: str = "joint", storage: Storage = "mcap") -> Path:
     """Write a record as a new bag of sensor_msgs/JointState, with a signals.yaml inside that reads it back.
 
-    Values are as in the record, scaled already; times are kept to a nanosecond, and begin at 0 where the record's are negative or
-    begin late. Raises InputError where the bag exists or cannot be written, or an acceleration was recorded, which no joint state
-    holds.
+    Values are those of the record, after scaling. Times are kept to a nanosecond; they are shifted to start at 0
+    where the record's times are negative or start late. Raises InputError where the bag exists or cannot be
+    written, or where the record has an acceleration, which no joint state can hold.
     """
     namespace = "/" + (re.sub(r"\W+", "_", record.name).strip("_") or "record")
     if namespace[1].isdigit():
@@ -69,7 +70,7 @@ def _field(role: str, record: Record) -> str:
 
 
 def _topic(role: str, channel: Channel, record: Record) -> str:
-    """States that share their times share a topic."""
+    """Topic of a channel: states with the same times share a topic."""
     if role in TOPICS:
         return TOPICS[role]
     if role == "output" or np.array_equal(channel.time, record.output.time):
@@ -79,7 +80,7 @@ def _topic(role: str, channel: Channel, record: Record) -> str:
 
 
 def _shift(record: Record) -> float:
-    """What is taken from the record's times [s] for a bag's stamps."""
+    """Time [s] that is subtracted from the record's times for the bag's stamps."""
     first = min(float(channel.time[0]) for channel in record.channels.values())
     return 0.0 if 0.0 <= first < RUN_CLOCK else first
 

@@ -1,18 +1,19 @@
-"""Times that a counter of so many bits has told, which begins again at zero: micros() of a small controller does after 71.6 minutes."""
+"""Times from a counter with a limited number of bits, which restarts at zero: micros() of a microcontroller after
+71.6 minutes."""
 
 from typing import Any
 
 import numpy as np
 
-# of the counts, and of counts of µs that are written in ms or s
+# spans of counters, and of µs counters that are written in ms or s
 SPANS = (2.0**16, 2.0**32, 2.0**32 * 1e-3, 2.0**32 * 1e-6)
-LONGEST_STEP_OVER_END = 3.0  # usual steps that the one over the end may be, a lost sample among them
+LONGEST_STEP_OVER_END = 3.0  # largest step across the restart, in usual steps: a lost sample may be included
 
 
 def unwrapped(values: Any) -> Any:
-    """A column with what has been counted before each new beginning added; the same where no counter has begun anew.
+    """A column with the counts before each restart added; unchanged where no counter has restarted.
 
-    A step back is the end of a counter where it falls short of the counter's span by as much as some steps forward.
+    A step back is a restart if it is smaller than the counter's span by the size of a few forward steps.
     """
     time = np.asarray(values)
     if time.dtype.kind not in "fiu" or time.ndim != 1 or len(time) < 3:

@@ -1,4 +1,4 @@
-"""Records of one machine whose positions lie far apart, as where an encoder was zeroed elsewhere."""
+"""Records of one machine whose positions are far apart, for example because an encoder was zeroed at another position."""
 
 from collections.abc import Sequence
 
@@ -8,9 +8,10 @@ from rhythmid.record.record import Record
 
 
 def elsewhere_notes(records: Sequence[Record]) -> tuple[str, ...]:
-    """A line on each record whose position lies further from that of the first than either of the two moves; none where none does.
+    """A line on each record whose position differs from that of the first by more than the motion of either; empty
+    where none does.
 
-    Not for other quantities, nor for records of several joints: a speed has no zero that a user chooses.
+    Only for positions of a single joint: other quantities, such as a speed, have no zero that a user chooses.
     """
     plain = [one for one in records if isinstance(one, Record) and one.output_kind == "position"]
     if not plain:

@@ -1,17 +1,18 @@
-"""Counts of an encoder that begin again after a turn: how many there are to a turn, as their jumps tell."""
+"""Encoder counts that restart after each turn: number of counts per turn, from the size of the jumps."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.record.angle_wrap import wraps_by
 
-# counts of a turn: those of absolute encoders, which are binary, and degrees with up to three decimals
+# counts per turn: powers of two for absolute encoders, and degrees with up to three decimals
 TURNS = (*(float(2**bits) for bits in range(8, 33)), 360.0, 3600.0, 36000.0, 360000.0)
-ROWS = 0.95  # share of steps of one size, from which a counter counts rows or time and no motion
+ROWS = 0.95  # share of steps of one size above which a counter counts rows or time and no motion
 
 
 def counts_of_turn(value: NDArray[np.float64]) -> float:
-    """The number of counts after which values (n,) begin again, all else about them moving on; 0 where they do not, or merely count rows."""
+    """Number of counts after which values (n,) restart while the motion goes on; 0 where they do not, or where they
+    only count rows."""
     value = value[np.isfinite(value)]
     if len(value) < 3 or value.min() < 0.0 or ((value != np.rint(value)).any() and value.max() > 360.0):
         return 0.0

@@ -1,7 +1,8 @@
-"""Ends of a record: measurements before the first sample of a force that acted then as well, and after the last one.
+"""Ends of a record: measurements before the first and after the last sample of a force that also acted then.
 
-A recorder hears one topic later than another. A pump's force did not begin with the first message of it, so that a machine whose forcing
-is taken for constant until then seems to lack something. What a program sends, a held command or a reference, does begin with it.
+A recorder subscribes to one topic later than to another. A pump's force did not start with its first recorded
+message. If the forcing were taken as constant before it, the model would seem to lack an effect. A signal that a
+program sends, such as a held command or a reference, does start with its first message.
 """
 
 from dataclasses import replace
@@ -18,7 +19,8 @@ Array = NDArray[np.float64]
 
 
 def acts_always(record: Record, role: str) -> bool:
-    """Whether the forcing or input acts before its first sample and after its last: what a sensor records, not what a program sends."""
+    """Whether the forcing or input also acts before its first and after its last sample: true for sensor data, not
+    for sent signals."""
     if role == "forcing":
         return record.forcing_law is None
     return record.input_kind.startswith("base_") or (
@@ -27,10 +29,12 @@ def acts_always(record: Record, role: str) -> bool:
 
 
 def within_samples_of(record: Record, role: str, least: int) -> tuple[Record, float]:
-    """The record without the measurements for which the channel is not known, and how much of the output [s] that leaves out.
+    """The record without the measurements for which the channel is unknown, and the duration [s] of output that is
+    left out.
 
-    The channel is known beyond its samples where it hardly changes in so short a time, or where it repeats: then samples of its Fourier series
-    are added. Nothing is left out where fewer than `least` measurements remain.
+    Beyond its samples the channel is known where it hardly changes in so short a time. It is also known where it is
+    periodic: then samples of its Fourier series are added. Nothing is left out where fewer than `least`
+    measurements would remain.
     """
     channel: Channel = getattr(record, role)
     output, period = record.output, channel.period
@@ -45,7 +49,7 @@ def within_samples_of(record: Record, role: str, least: int) -> tuple[Record, fl
     for count, step, edge in zip(counts, (-period, period), channel.time[[0, -1]]):
         if count == 0 or change_within(channel.value, count) * count < allowed:
             continue
-        # no further than the record of it is long
+        # at most by the length of the channel's record
         if law is not None and count < len(channel) and law.left * count < allowed:
             time = edge + step * np.arange(1, count + 1)
             added.append((time, law(time)))
@@ -65,7 +69,7 @@ def within_samples_of(record: Record, role: str, least: int) -> tuple[Record, fl
 
 
 def change_within(value: Array, count: int) -> float:
-    """rms change of a signal (n,) over so many samples; infinite where there are too few to tell."""
+    """rms change of a signal (n,) over `count` samples; infinite where there are too few to measure it."""
     if 2 * count >= len(value):
         return np.inf
     return float(np.sqrt(np.mean((value[count:] - value[:-count]) ** 2)))

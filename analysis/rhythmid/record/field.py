@@ -1,4 +1,4 @@
-"""Field paths: which number of a message, such as `effort[leg]`, `data[3]` or `wrench.force.z`."""
+"""Field paths: identify one number of a message, such as `effort[leg]`, `data[3]` or `wrench.force.z`."""
 
 import re
 from collections.abc import Mapping
@@ -11,9 +11,9 @@ from rosbags.interfaces import Nodetype
 from rhythmid.errors import InputError
 
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[\s*([^\[\]]+?)\s*\]")
-LONGEST_POSITION = 10  # digits of a position in a list, whose length is a number of 32 bits
+LONGEST_POSITION = 10  # digits of an index into a list; the length of a list is a 32-bit number
 NAMES = ("name", "names", "joint_names")  # lists that name the entries of the lists beside or below them
-# texts that name the entry of a list that they stand in, as in a tree of frames
+# texts that name the list entry that contains them, as in a tree of frames
 OWN_NAMES = ("child_frame_id",)
 
 TypeFields = Mapping[
@@ -23,14 +23,14 @@ TypeFields = Mapping[
 
 @dataclass(frozen=True)
 class Field:
-    """A path to one number. `steps` are field names (str), positions (int) and names of entries ((name,))."""
+    """A path to one number. `steps` are field names (str), indices (int) and names of entries ((name,))."""
 
     text: str
     steps: tuple[Any, ...]
 
     @classmethod
     def parse(cls, text: str) -> "Field":
-        """The path in `text`: names joined by dots, each followed by [index] or [name of joint] where it is a list."""
+        """The path in `text`: names joined by dots, each followed by [index] or [joint name] where it is a list."""
         steps: list[Any] = []
         at = 0
         while at < len(text):
@@ -55,7 +55,7 @@ class Field:
     def check(self, msgtype: str, types: TypeFields) -> None:
         """Raise InputError unless messages of `msgtype` have such a number."""
         kind: Any = (Nodetype.NAME, msgtype)
-        named = False  # whether some message on the way names entries
+        named = False  # whether a message on the path names its entries
         done = ""
         for step in self.steps:
             if isinstance(step, str):
@@ -85,7 +85,7 @@ class Field:
 
 
 def _name_themselves(kind: Any, types: TypeFields) -> bool:
-    """Whether the entries of a list are messages that bear names."""
+    """Whether the entries of a list are messages that contain their names."""
     return kind[0] == Nodetype.NAME and any(name in dict(types[kind[1]][1]) for name in OWN_NAMES)
 
 

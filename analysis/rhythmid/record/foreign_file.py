@@ -1,4 +1,4 @@
-"""Files of other programs that are not read, and what makes a bag or a table of each."""
+"""Files of other programs that are not supported, and how to convert each to a bag or a table."""
 
 import os
 from pathlib import Path
@@ -16,9 +16,10 @@ KINDS = {
 
 
 def refuse_foreign(path: Path) -> None:
-    """Raise InputError, one line with what to do, where a path is a file of another program, or a directory with bags of ROS 1."""
+    """Raise InputError, one line with advice, where a path is a file of another program, or a directory with bags
+    of ROS 1."""
     suffix = path.suffix.lower()
-    if os.path.isdir(path):  # false of a name that is too long for one
+    if os.path.isdir(path):  # False for a name that is too long
         if not any(path.glob("*.bag")) or (path / "metadata.yaml").exists():
             return
         path, suffix = min(path.glob("*.bag")), ".bag"

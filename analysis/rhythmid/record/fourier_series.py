@@ -1,4 +1,4 @@
-"""Fourier series of a recorded signal that repeats, at a period that the signal itself tells."""
+"""Fourier series of a periodic recorded signal, with the period estimated from the signal."""
 
 from dataclasses import dataclass
 
@@ -8,17 +8,18 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 
 Array = NDArray[np.float64]
-HARMONICS = 9  # that are looked for
-HARMONIC = 1e-3  # share of a signal that its best period may leave before multiples of that period are tried
-ENOUGH_SAMPLES = 60_000  # samples of a signal that is far oversampled
-LEAST_PERIODS_COVERED = 2.0  # that a signal has to cover, for its period and phase to be told
+HARMONICS = 9  # number of harmonics that are fitted
+HARMONIC = 1e-3  # residual share at the best period above which multiples of that period are tried
+ENOUGH_SAMPLES = 60_000  # samples that are enough of a signal that is far oversampled
+# least number of periods in the signal for its period and phase to be identifiable
+LEAST_PERIODS_COVERED = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class FourierSeries:
-    """Re Σ_h F_h exp(j 2π h f t), h = 0 … H, in the signal's own time t [s], with what it leaves of the signal.
+    """Re Σ_h F_h exp(j 2π h f t), h = 0 … H, in the signal's own time t [s], with the residual of the signal.
 
-    `frequency` f [Hz]; `coefficients` complex128[H + 1] and `left`, an rms, in the signal's unit.
+    `frequency` f [Hz]; `coefficients` complex128[H + 1] and the rms residual `left`, in the signal's unit.
     """
 
     frequency: float
@@ -58,8 +59,8 @@ def periodic(time: Array, value: Array) -> FourierSeries | None:
 
 
 def fundamental_frequency(time: Array, value: Array) -> float:
-    """Frequency [Hz] of a periodic signal (n,) sampled at increasing times [s]: strongest line, refined to full
-    precision by the drift of its phase; 0 where none is stronger than its trend."""
+    """Frequency [Hz] of a periodic signal (n,) sampled at increasing times [s]: its strongest spectral line,
+    refined to full precision by the drift of its phase; 0 where no line is stronger than the signal's trend."""
     n = len(time)
     span = time[-1] - time[0]
     even = np.linspace(time[0], time[-1], n)
@@ -70,7 +71,8 @@ def fundamental_frequency(time: Array, value: Array) -> float:
     if line == 0.0:
         return 0.0  # a trend, no oscillation
     frequency, left = _refined(time - time.mean(), value, line)
-    for divisor in (2, 3):  # the strongest line may be a harmonic: then a multiple of its period leaves less
+    # the strongest line may be a harmonic: then a multiple of its period leaves a smaller residual
+    for divisor in (2, 3):
         if left > HARMONIC * np.std(value) and line * span > 1.5 * divisor:
             lower, rest = _refined(time - time.mean(), value, line / divisor)
             if rest < 0.7 * left and lower * span > 1.0:
@@ -79,7 +81,7 @@ def fundamental_frequency(time: Array, value: Array) -> float:
 
 
 def _refined(time: Array, value: Array, frequency: float) -> tuple[float, float]:
-    """The frequency of a Fourier series near `frequency`, first with one harmonic; and the rms of what it leaves."""
+    """The frequency of a Fourier series near `frequency`, first with one harmonic; and its rms residual."""
     rate = (len(time) - 1) / (time[-1] - time[0])
     left = 0.0
     for harmonics in (1, int(np.clip(0.25 * rate / frequency, 1, HARMONICS))):
@@ -88,10 +90,11 @@ def _refined(time: Array, value: Array, frequency: float) -> tuple[float, float]
 
 
 def _fourier_fit(time: Array, value: Array, frequency: float, harmonics: int) -> tuple[float, float]:
-    """Gauss-Newton on the frequency of a Fourier series with so many harmonics; and the rms of what it leaves.
+    """Gauss-Newton on the frequency of a Fourier series with `harmonics` harmonics; and its rms residual.
 
-    It ends where a step leaves the line that it began on, as it does where there is none, and where the samples do not tell the harmonics
-    apart, such as of two stretches with a gap of many periods between them.
+    The iteration ends where a step leaves the spectral line on which it started, as it does where there is none. It
+    also ends where the samples do not separate the harmonics, for example two stretches with a gap of many periods
+    between them.
     """
     left, begin = float(np.std(value)), frequency
     near = min(1.0 / (time[-1] - time[0]), 0.5 * begin)
@@ -130,7 +133,7 @@ def _fourier_fit(time: Array, value: Array, frequency: float, harmonics: int) ->
 def _projection(
     time: Array, value: Array, frequency: float, harmonics: int
 ) -> tuple[NDArray[np.complex128], Array]:
-    """Least-squares coefficients F_0 … F_H of `value` in time, and what they leave (n,)."""
+    """Least-squares coefficients F_0 … F_H of `value` in time, and the residual (n,)."""
     angle = np.multiply.outer(2 * np.pi * frequency * time, np.arange(1, harmonics + 1))
     columns = np.hstack([np.ones((len(time), 1)), np.cos(angle), np.sin(angle)])
     solution = np.linalg.lstsq(columns, value, rcond=1e-10)[0]

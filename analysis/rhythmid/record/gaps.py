@@ -1,7 +1,8 @@
-"""Gaps: where a channel lacks samples, which of them the others tell, and a record cut where they do not.
+"""Gaps: missing samples of a channel. They are interpolated where possible; otherwise the record is cut there.
 
-A measurement that is missing is not compared, nothing else happens. A command that is missing acted all the same: where neither its
-neighbours nor its repetition tell what it was, the record is cut, and goes on with an initial state of its own.
+A missing measurement is not compared, with no further effect. A missing command acted on the machine nevertheless.
+Where neither its neighbours nor its periodicity determine it, the record is cut and continues with a new initial
+state.
 """
 
 from collections.abc import Iterable
@@ -18,15 +19,16 @@ from rhythmid.record.timing import gaps_between
 from rhythmid.record.tolerable import tolerable_error
 
 Array = NDArray[np.float64]
-PAST = 0.05  # s of a command that are known before the first measurement behind a gap: it may act so late
-LEAST_SAMPLES = 32  # measurements of a stretch, below which its initial state takes all that it tells
+# [s] of a command that must be known before the first measurement after a gap: its delay may be as long
+PAST = 0.05
+LEAST_SAMPLES = 32  # least measurements in a stretch: with fewer, its initial state absorbs all information
 
 
 @dataclass(frozen=True)
 class Cut:
-    """The stretches of a record between the `gaps` of its commands, from and until [s], and what there is to say of them.
+    """The stretches of a record between the `gaps` of its commands, from and until [s], and messages about them.
 
-    `whole` is the record uncut, with what could be filled in filled in; `filled` are those of the notes that hold for it, too.
+    `whole` is the uncut record with short gaps filled; `filled` are the notes that also apply to it.
     """
 
     stretches: tuple[Record, ...]
@@ -37,12 +39,13 @@ class Cut:
 
 
 def cut_at_gaps(record: Record) -> Cut:
-    """The record with short gaps of its commands filled in, cut at the long ones.
+    """The record with short gaps of its commands filled, cut at the long ones.
 
-    A gap is short where a cubic through its neighbours, or the Fourier series of a command that repeats, tells the command so
-    well that the error moves the machine by less than the noise of the measurement; how well it does is seen where no sample
-    is missing. A held command that is the same before and after is not missing. The stretches bear the name of the record
-    with the time at which they begin. Measurements outside the samples of a force that acted then, too, are left out (`ends`).
+    A gap is short where a cubic through its neighbours, or the Fourier series of a periodic command, is accurate
+    enough: the resulting error of the motion is below the measurement noise. The accuracy is measured where no
+    sample is missing. A held command with the same value before and after a gap is not missing. The stretches have
+    the record's name with their start time. Measurements outside the samples of a force that also acted then are
+    left out (`ends`).
     """
     notes: list[str] = []
     spans: list[tuple[float, float]] = []
@@ -69,7 +72,7 @@ def cut_at_gaps(record: Record) -> Cut:
         return Cut((record,), filled_in, record, filled_in)
     stretches = tuple(_between(record, _joined(spans)))
     if not stretches:
-        return Cut((record,), filled_in, record, filled_in)  # too often to be cut: what remains is the hold
+        return Cut((record,), filled_in, record, filled_in)  # too many gaps to cut: the hold is used
     kept = sum(one.duration for one in stretches)
     gaps = tuple(_joined(spans))
     notes.append(
@@ -94,7 +97,7 @@ def _bridged(channel: Channel, output: Channel, held: bool) -> tuple[Channel, in
     law = None if held else periodic(channel.time, channel.value)
     left = np.inf if law is None else law.left
     told = np.minimum(errors, left) / spread * lost * channel.period < tolerable
-    told &= lost <= len(value)  # a gap that is longer than what was recorded is none that it tells
+    told &= lost <= len(value)  # a gap that is longer than the recorded part cannot be filled from it
     stamps, values = [time], [value]
     for at, count, error in zip(first[told], lost[told], errors[told]):
         between = time[at] + (time[at + 1] - time[at]) * np.arange(1, count + 1) / (count + 1)
@@ -112,7 +115,7 @@ def _bridged(channel: Channel, output: Channel, held: bool) -> tuple[Channel, in
 
 
 def _joined(spans: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Spans that overlap made one, in order."""
+    """Overlapping spans merged, in order."""
     found: list[tuple[float, float]] = []
     for begin, end in sorted(spans):
         if found and begin <= found[-1][1]:

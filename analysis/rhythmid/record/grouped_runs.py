@@ -1,4 +1,4 @@
-"""Runs that a file keeps side by side, each in a struct or a group of its own: `runs[0].q` and `runs[1].q`, `trial1.q` and `trial2.q`."""
+"""Several runs in one file, each in its own struct or group: `runs[0].q` and `runs[1].q`, `trial1.q` and `trial2.q`."""
 
 import re
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ import numpy as np
 
 from rhythmid.record.table import Table
 
-NUMBERED = re.compile(r"(.*?)(\[\d+\]|\d+)")  # a struct or a group that is one of several
+NUMBERED = re.compile(r"(.*?)(\[\d+\]|\d+)")  # a numbered struct or group
 OF_RUNS = re.compile(
     r"(?:.*[._ ])?(?:episodes?|trials?|runs?|trajector(?:y|ies)|segments?|tests?|exp|experiments?|rec|recordings?|records?|logs?"
     r"|measurements?|sessions?|takes?|sweeps?)[._ ]?",
@@ -21,18 +21,18 @@ TIME = re.compile(r"(?:.*[._ ])?(?:time|timestamp|stamp|t)(?:[._ ]?(?:s|ms|us|ns
 
 @dataclass(frozen=True)
 class Runs:
-    """Runs by the path to them, as `runs[0]`, in the order of the file; the arrays of each by their names within it."""
+    """Runs by path, such as `runs[0]`, in the order of the file; the arrays of each by their names within the run."""
 
     members: Mapping[str, Mapping[str, Any]]
 
     @property
     def note(self) -> str:
-        """How many there are, as a phrase."""
+        """The number of runs, as a phrase."""
         first, *_, last = self.members
         return f"{len(self.members)} runs, {first} to {last}"
 
     def alone(self, table: Table, column: str | None = None) -> Table:
-        """The table without the arrays of all runs but the one that holds the `column`, by default the first."""
+        """The table with only the arrays of the run that holds `column`, by default the first run."""
         paths = [f"{path}." for path in self.members]
         own = next((path for path in paths if column is not None and column.startswith(path)), paths[0])
         others = tuple(path for path in paths if path != own)
@@ -40,15 +40,15 @@ class Runs:
         return Table(table.path, kept)
 
     def numbered(self) -> dict[str, Mapping[str, Any]]:
-        """The arrays of each by what tells it from the others: its number."""
+        """The arrays of each run by its number."""
         return {re.findall(r"\d+", path)[-1]: arrays for path, arrays in self.members.items()}
 
 
 def grouped_runs(table: Table) -> Runs | None:
-    """The runs that a table holds side by side, each with a time of its own; None where it holds no two.
+    """The runs that a table holds side by side, each with its own time; None where there are fewer than two.
 
-    Structs and groups whose times are the same sample by sample were recorded at once, as the joints of a robot are, unless they are
-    called runs.
+    Structs and groups with identical times were recorded together, such as the joints of a robot, unless their name
+    says that they are runs.
     """
     families: dict[str, dict[str, dict[str, Any]]] = {}
     for name, values in table.columns.items():
@@ -62,7 +62,8 @@ def grouped_runs(table: Table) -> Runs | None:
 
 
 def _places(name: str) -> list[tuple[str, str, str]]:
-    """What the groups of a path are called without their number, the path to each with it, and what follows within it."""
+    """Names of the numbered groups in a path without their number, the path to each including it, and the rest of
+    the path."""
     parts = name.split(".")
     return [
         (".".join([*parts[:place], match[1]]), ".".join(parts[: place + 1]), ".".join(parts[place + 1 :]))

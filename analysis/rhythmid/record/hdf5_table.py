@@ -1,4 +1,4 @@
-"""Arrays of an HDF5 file by the path to them, MATLAB's own of version 7.3 among them (https://docs.hdfgroup.org)."""
+"""Arrays of an HDF5 file by path, including MATLAB files of version 7.3 (https://docs.hdfgroup.org)."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,26 +13,27 @@ from rhythmid.record.matlab_objects import complaint_of_objects
 from rhythmid.record.own_process import arrays_in_own_process
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
-STARTS = (0, 512)  # bytes in front of it that are looked behind: MATLAB writes a header of its own there
-OF_MATLAB = "MATLAB_class"  # attribute by which MATLAB says what a dataset is
-NUMBERS = "fiub"  # kinds of data types
-OF_OBJECT = "MATLAB_object_decode"  # the same of an object, of which the dataset holds where it is kept, and no number of it
-REFERENCES = "#"  # with which MATLAB begins the names of the groups to which its structs and cells refer
-DEEPEST = 4  # structs and cells within one another that are looked into
+STARTS = (0, 512)  # offsets at which HDF5 may begin: MATLAB writes its own header first
+OF_MATLAB = "MATLAB_class"  # attribute with MATLAB's class of a dataset
+NUMBERS = "fiub"  # kinds of numeric data types
+# the same for an object, whose dataset holds only a reference and no numbers
+OF_OBJECT = "MATLAB_object_decode"
+REFERENCES = "#"  # first character of the groups to which MATLAB's structs and cells refer
+DEEPEST = 4  # nesting depth of structs and cells that are read
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether a file holds HDF5, whatever it is called. Raises OSError where it cannot be opened."""
+    """Whether a file holds HDF5, whatever its name is. Raises OSError where it cannot be opened."""
     with path.open("rb") as file:
         return any(file.seek(start) == start and file.read(len(SIGNATURE)) == SIGNATURE for start in STARTS)
 
 
 def read_hdf5(path: Path) -> dict[str, NDArray[Any]]:
-    """Arrays of numbers with one or two dimensions, `group.name` for those within groups.
+    """Arrays of numbers with one or two dimensions, named `group.name` within groups.
 
-    Of MATLAB's struct arrays and cells, which refer to groups of the same file, it is `runs[0].name`. What refers to other files is
-    not followed, and texts are left out. Raises InputError where h5py is not installed, or the file is damaged or claims to hold more
-    than its size allows.
+    MATLAB's struct arrays and cells refer to groups of the same file; their arrays are named `runs[0].name`.
+    References to other files are not followed, and texts are left out. Raises InputError where h5py is not
+    installed, or where the file is damaged or claims more data than its size allows.
     """
     try:
         import h5py
@@ -54,7 +55,7 @@ def read_hdf5(path: Path) -> dict[str, NDArray[Any]]:
 
 @dataclass
 class _Reader:
-    """Collects arrays by the path to them, of no more than `most` bytes, and the classes of MATLAB's objects."""
+    """Collects arrays by path, at most `most` bytes in all, and the classes of MATLAB's objects."""
 
     most: int
     left: int = field(init=False)
@@ -65,7 +66,7 @@ class _Reader:
         self.left = self.most
 
     def take_all(self, above: str, group: Any, depth: int = 0) -> None:
-        """What is in a group, following no link to another file."""
+        """Read a group without following links to other files."""
 
         def visit(name: str, one: Any) -> None:
             if not name.startswith(REFERENCES):
@@ -74,7 +75,7 @@ class _Reader:
         group.visititems(visit)
 
     def take(self, name: str, one: Any, depth: int) -> None:
-        """A dataset of numbers, or what one of references refers to."""
+        """Read a dataset of numbers, or the target of each reference in it."""
         import h5py
 
         if not isinstance(one, h5py.Dataset) or one.external or one.is_virtual:
@@ -91,14 +92,14 @@ class _Reader:
             raise ValueError(f"claims to hold more than {self.most} bytes")
         values = np.asarray(one[()])
         if is_number:
-            self.found[name] = values if of_matlab is None else values.T  # columns come first there
+            self.found[name] = values if of_matlab is None else values.T  # MATLAB stores columns first
         elif depth < DEEPEST:
             for number, reference in enumerate(values.ravel()):
                 if reference:
                     self.take_element(name, number, of_matlab == b"cell", one.file[reference], depth + 1)
 
     def take_element(self, name: str, number: int, of_cell: bool, one: Any, depth: int) -> None:
-        """An element of a cell, or that field of an element of a struct array which `name` ends with."""
+        """Read an element of a cell, or the field `name` of an element of a struct array."""
         above, _, last = name.rpartition(".")
         path = f"{name}[{number}]" if of_cell or not above else f"{above}[{number}].{last}"
         if hasattr(one, "visititems"):

@@ -1,4 +1,4 @@
-"""What the heading of a table's column says besides its name: the unit, as in `q [rad]`, `tau (Nm)`, `pos_deg`."""
+"""Units in the headings of table columns, as in `q [rad]`, `tau (Nm)`, `pos_deg`."""
 
 import math
 import re
@@ -25,23 +25,24 @@ SPELLINGS = {
     "rads": "rad/s", "mps": "m/s", "radps": "rad/s", "degps": "deg/s", "r/min": "rpm", "1/min": "rpm", "rev/min": "rpm",
     "rpm": "rpm", "deg": "deg", "rad": "rad",  # in any case: RPM, Deg
 }  # fmt: skip
-# after an underscore, in any case; not those that are words or other quantities, too: _in, _g, _min, _rev
+# after an underscore, in any case; without those that are also words or other quantities: _in, _g, _min, _rev
 SUFFIXES = (
     "deg_per_s", "rad_per_s", "m_per_s", "mm_per_s", "deg_s", "rad_s", "mm_s", "m_s2", "m_s", "rad_s2", "deg", "degrees", "rad",
     "radians", "rads", "radps", "degps", "dps", "rpm", "mps", "mm", "cm", "mrad", "nm", "mnm", "n", "m", "ma", "a", "v", "mv", "msec",
     "ms", "usec", "us", "nsec", "ns", "nanoseconds", "milliseconds", "seconds", "secs", "sec", "s",
 )  # fmt: skip
-COUNTERS = ("millis", "micros", "nanos")  # of Arduino's clock: names that are units
-WORDS = ("rpm", "deg", "degrees", "radians", "dps")  # mean nothing else, wherever in a name they stand
-LETTERS = {  # a single letter is a unit only behind a word that it suits: pos_a is no current
+COUNTERS = ("millis", "micros", "nanos")  # names of Arduino's clock functions, which are units
+WORDS = ("rpm", "deg", "degrees", "radians", "dps")  # unambiguous units, anywhere in a name
+LETTERS = {  # a single letter is a unit only after a suitable word: pos_a is no current
     "s": "t time timestamp stamp elapsed", "m": "pos position x y z height displacement disp length travel stroke",
     "n": "f force load thrust", "a": "i iq current cur", "v": "u voltage volt supply",
 }  # fmt: skip
-# units that may be glued to a name, and the names that they suit: a yrad is one, a grad and a thread are words
+# units that may follow a name directly, with the names that they suit: "yrad" has one; "grad" and "thread" are words
 GLUED = {
     "deg rad mrad": "x y q ang angle pos position theta phi psi alpha beta gamma roll pitch yaw tilt enc encoder",
     "mm": "x y z pos position height disp displacement dist distance length travel stroke",
-    "cm": "pos position height disp displacement dist distance length travel stroke",  # an xcm is the place of a centre of mass
+    # "xcm" is the position of a centre of mass
+    "cm": "pos position height disp displacement dist distance length travel stroke",
     "rpm rads radps degps dps": "w n vel velocity speed omega rate",
     "ms us ns msec usec nsec sec secs": "t time timestamp stamp elapsed", "nm mnm": "tau torque moment trq", "ma": "cur current curr iq",
     "mv": "volt voltage",
@@ -49,18 +50,19 @@ GLUED = {
 _GLUED = {
     stem + unit: unit for units, stems in GLUED.items() for unit in units.split() for stem in stems.split()
 }
-# with a capital, behind any name: not those that are abbreviations of something else, as in velMa, xCm and velMs
+# capitalised units after any name; without those with other meanings, as in velMa, xCm and velMs
 CAPITALS = frozenset("deg degrees rad radians mrad rads radps degps dps rpm mm nm mnm".split())
-_CAPITAL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")  # where a word of kneePosRad begins
+_CAPITAL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")  # start of a word in kneePosRad
 _BRACKETS = re.compile(r"^(.*?)\s*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]\s*$")
 _SLASH = re.compile(r"^(.+?)\s+(?:/|in)\s+(\S+)$")  # "angle / deg", "angle in deg"
 
 
 @dataclass(frozen=True)
 class Heading:
-    """A column's heading: the `name` without the unit, and the SI `unit` of which the column's numbers are `scale` each.
+    """A column's heading: the `name` without the unit, the SI `unit`, and the `scale` of the column's numbers in
+    that unit.
 
-    `unit` is empty where none is told; `written` is the unit as the heading spells it.
+    `unit` is empty where none is given; `written` is the unit as spelled in the heading.
     """
 
     name: str
@@ -70,13 +72,13 @@ class Heading:
 
     @property
     def converted(self) -> bool:
-        """Whether the heading tells a unit that is not SI."""
+        """Whether the heading has a unit that is not SI."""
         return self.scale != 1.0
 
 
 def heading_of(column: str) -> Heading:
-    """The heading `column` taken apart: a unit in brackets, behind a slash, as a suffix after an underscore or with a capital, glued
-    to a name that it suits, or a word of the name."""
+    """Parse the heading `column`: a unit in brackets, after a slash, as a suffix after an underscore or with a
+    capital, directly after a name that it suits, or as a word of the name."""
     column = column.strip()
     if column.lower() in COUNTERS and (known := _unit(column)) is not None:
         return Heading(column, *known, column)
@@ -98,7 +100,7 @@ def heading_of(column: str) -> Heading:
 
 
 def _with_word(column: str) -> Heading:
-    """The heading of a column of whose name one word is a unit, as in `rpm`, `rpm_left` and `Motor RPM 2`."""
+    """Parse a heading with a unit as one of its words, as in `rpm`, `rpm_left` and `Motor RPM 2`."""
     words = [match for match in re.finditer(r"[A-Za-z]+", column) if match[0].lower() in WORDS]
     if len(words) != 1 or (known := _unit(words[0][0])) is None:
         return Heading(column)
@@ -107,7 +109,7 @@ def _with_word(column: str) -> Heading:
 
 
 def _glued(column: str) -> str:
-    """The unit at the end of a name with nothing between them, in lower case; empty where there is none."""
+    """The unit directly at the end of a name, in lower case; empty where there is none."""
     *before, last = _CAPITAL.split(re.split(r"[\s_.]", column)[-1])
     if before and last.lower() in CAPITALS:
         return last.lower()
@@ -115,7 +117,7 @@ def _glued(column: str) -> str:
 
 
 def is_unit(text: str) -> bool:
-    """Whether a cell below a column's name can be its unit: one that is known, a dash or nothing."""
+    """Whether a cell below a column's name can be its unit: a known unit, a dash or an empty cell."""
     bare = bare_unit(text)
     return bare in ("", "-", "1", "%") or _unit(bare) is not None
 
@@ -126,7 +128,7 @@ def bare_unit(text: str) -> str:
 
 
 def _unit(text: str) -> tuple[str, float] | None:
-    """SI unit and factor of a unit as it is written; None where it is not known."""
+    """SI unit and factor of a written unit; None where it is unknown."""
     text = text.strip().replace(" per ", "/").replace("²", "^2").replace("^2", "²").replace("**2", "²")
     text = re.sub(r"(?<=s)2$", "²", text)
     parts = [re.sub(r"[\s·*⋅.]", "", part) for part in text.split("/")]
@@ -142,7 +144,7 @@ def _unit(text: str) -> tuple[str, float] | None:
 
 
 def _spelled(suffix: str) -> str:
-    """A suffix as the unit that it stands for."""
+    """The unit that a suffix stands for."""
     special = {"nm": "Nm", "mnm": "mNm", "n": "N", "ma": "mA", "a": "A", "v": "V", "mv": "mV"}
     if suffix in special:
         return special[suffix]

@@ -1,8 +1,9 @@
-"""Samples that were held back and came in bursts, each with the time at which it came: when they were taken.
+"""Samples that arrived in bursts and are stamped with their arrival times: reconstruction of their sampling times.
 
-A device samples evenly; a network or a logger passes the samples on in bursts. The k-th was then taken at a + b k, and came late by
-what is left of its time. The line is the highest that no sample came before (S. B. Moon, P. Skelly, D. Towsley, IEEE INFOCOM 1999, 227):
-the samples that came soonest count as not late at all, for a delay that all share cannot be seen.
+A device samples evenly; a network or a logger passes the samples on in bursts. Sample k was taken at a + b k, and
+the rest of its time is latency. The line is the highest one below all arrival times (S. B. Moon, P. Skelly, D.
+Towsley, IEEE INFOCOM 1999, 227). The earliest samples count as having no latency, because a delay common to all
+cannot be observed.
 """
 
 from collections.abc import Mapping
@@ -17,18 +18,22 @@ from rhythmid.record.record import Channel
 from rhythmid.record.timing import BURSTS, nominal_period
 
 Array = NDArray[np.float64]
-# of the error of a straight line through both neighbours, at which samples are the smoother for even times: noise alone makes it 0.87
+# ratio of errors of a straight line through both neighbours, even over recorded times, below which the even times
+# are better: noise alone gives 0.87
 SMOOTHER = 0.5
-MINIMA = 64  # parts of a recording of whose samples only the soonest can touch the line
-PARTS = 8  # of a recording, whose soonest samples are compared: a lost sample shifts all that follow, a busy network only delays some
-STEADY = 0.5  # of a period, by which these may be late: one lost sample makes it 0.8, bursts of 4 to 6 samples alone up to 0.4
-LEAST_SAMPLES_IN_BURSTS = 200  # samples, so that each part has several bursts
+MINIMA = 64  # parts of a recording; only the earliest sample of each can touch the line
+# parts of a recording whose earliest samples are compared: a lost sample shifts all later ones, a busy network
+# delays only some
+PARTS = 8
+# periods by which the earliest samples may be late: one lost sample gives 0.8, bursts of 4 to 6 samples alone up to 0.4
+STEADY = 0.5
+LEAST_SAMPLES_IN_BURSTS = 200  # so that each part has several bursts
 
 
 def evened(channels: Mapping[str, Channel]) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """The channels with the times at which samples that came in bursts were taken, and a note where there are such.
+    """The channels with the sampling times of samples that arrived in bursts, and a note where there are such samples.
 
-    Channels that share their times are treated alike. A channel in which samples are missing keeps its times.
+    Channels with the same times are treated together. A channel with missing samples keeps its times.
     """
     found, notes = dict(channels), []
     for role, channel in channels.items():
@@ -49,7 +54,8 @@ def evened(channels: Mapping[str, Channel]) -> tuple[dict[str, Any], tuple[str, 
 
 
 def _taken(time: Array, values: list[Array]) -> Array | None:
-    """Times (n,) at which samples were taken that came at `time`; None where that is when they came, or samples are missing."""
+    """Sampling times (n,) of samples that arrived at `time` (n,); None where the two agree, or where samples are
+    missing."""
     if len(time) < LEAST_SAMPLES_IN_BURSTS:
         return None
     step = np.diff(time)
@@ -67,7 +73,7 @@ def _taken(time: Array, values: list[Array]) -> Array | None:
 
 
 def _line_below(number: Array, time: Array) -> tuple[float, float]:
-    """Value at zero and slope of the straight line below all points that comes nearest to them on average."""
+    """Value at zero and slope of the straight line below all points that is closest to them on average."""
     slope, _ = np.polyfit(number, time, 1)
     left = time - slope * number
     lowest = [int(part[np.argmin(left[part])]) for part in np.array_split(np.arange(len(left)), MINIMA)]
@@ -82,7 +88,8 @@ def _line_below(number: Array, time: Array) -> tuple[float, float]:
 
 
 def _smoother(time: Array, value: Array) -> bool:
-    """Whether samples lie nearer to a straight line through their neighbours at even times than at the times given."""
+    """Whether samples are closer to a straight line through their neighbours with even times than with the recorded
+    times."""
     before, after = value[:-2], value[2:]
     share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
     even = value[1:-1] - 0.5 * (before + after)

@@ -1,7 +1,8 @@
-"""A command that comes as an event is in force until the next one; a measured channel is a signal between its samples, too.
+"""Hold of a command between samples: an event-based command holds its value; a measured signal changes between samples.
 
-Neither straight lines nor a band-limited curve say what was between samples that do not resolve the signal. Whether they do, they show
-themselves: a line through both neighbours of a sample comes nearer to it than the sample before does.
+Where samples do not resolve the signal, neither straight lines nor a band-limited curve give its values between
+them. The samples show whether they resolve it: then a line through a sample's neighbours is closer to it than the
+sample before.
 """
 
 import numpy as np
@@ -10,18 +11,19 @@ from numpy.typing import NDArray
 from rhythmid.record.record import Channel
 
 Array = NDArray[np.float64]
-# usual intervals of the output, from which one of the input is far longer. Loggers read what is measured side by side, or divide
-# a clock by some small number
+# ratio of the input's interval to the output's above which the input is far sparser. Loggers sample measured
+# signals together, or divide a clock by a small number
 SPARSE = 10.0
-# of the error of the sample before, rms: what a line through both neighbours may leave of a signal that its samples resolve. It is
-# sin(π f T) for a sine f sampled every T [s], so this is six samples a period, of which a line misses 13 %; steps that have nothing
-# to do with each other leave 0.71, independent samples 0.87
+# ratio of rms errors, a line through both neighbours over the sample before, below which samples resolve the
+# signal. It is sin(π f T) for a sine of frequency f sampled every T [s], so this is six samples per period, of
+# which a line misses 13 %. Unrelated steps give 0.71, independent samples 0.87
 RESOLVED = 0.5
 LEAST_SAMPLES_TO_RESOLVE = 3  # samples, of which one has two neighbours
 
 
 def held_note(given: Channel, answer: Channel) -> str | None:
-    """What to tell of a channel that drives where it is far sparser than what answers and changes in steps; None where it is not."""
+    """Message about a driving channel that is far sparser than the response and changes in steps; None where it is
+    not."""
     (time, first), (of_answer, _) = (np.unique(one.time, return_index=True) for one in (given, answer))
     value = given.value[first]
     if len(time) < 2 or len(of_answer) < 2 or np.ptp(value) == 0.0:
@@ -36,7 +38,7 @@ def held_note(given: Channel, answer: Channel) -> str | None:
 
 
 def _is_resolved(time: Array, value: Array) -> bool:
-    """Whether samples (n,) go on smoothly from one to the next; too few show nothing of the kind."""
+    """Whether samples (n,) resolve their signal; False for too few samples."""
     if len(value) < LEAST_SAMPLES_TO_RESOLVE:
         return False
     share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])

@@ -1,4 +1,4 @@
-"""What the neighbours of missing samples tell of them: a cubic through four, and how well it does."""
+"""Interpolation of missing samples by a cubic through four neighbours, and its error."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,11 +7,12 @@ Array = NDArray[np.float64]
 
 
 def interpolation_errors(value: Array, missing: NDArray[np.int64]) -> Array:
-    """rms error (m,) of a cubic through two samples on either side of so many `missing` ones (m,), at their middle.
+    """rms error (m,) at the middle of `missing` (m,) samples of a cubic through two samples on either side.
 
-    Seen on the samples (n,) that there are; infinite where they are too few. Of white noise it is about the noise itself.
+    It is measured on the existing samples (n,); infinite where they are too few. For white noise it is about the
+    noise level.
     """
-    most = min(int(missing.max(initial=0)), len(value) // 4)  # for more there are too few samples
+    most = min(int(missing.max(initial=0)), len(value) // 4)  # for longer gaps there are too few samples
     found = np.full(most + 2, np.inf)
     found[0] = 0.0
     for count in range(1, most + 1):
@@ -27,12 +28,12 @@ def interpolation_errors(value: Array, missing: NDArray[np.int64]) -> Array:
         error = value[middle : len(value) - reach + middle] - told
         found[count] = float(np.sqrt(np.mean(error**2)))
         if found[count] > np.std(value):
-            break  # longer ones are worse
+            break  # longer gaps are worse
     return found[np.minimum(missing, most + 1)]
 
 
 def _lagrange(nodes: Array, at: float) -> Array:
-    """Weights (n,) of the values at the nodes in the polynomial through them, at one place."""
+    """Weights (n,) of the values at the nodes in the interpolating polynomial at one position."""
     apart = at - nodes
     return np.array(
         [np.prod(np.delete(apart, k)) / np.prod(nodes[k] - np.delete(nodes, k)) for k in range(len(nodes))]
@@ -40,5 +41,5 @@ def _lagrange(nodes: Array, at: float) -> Array:
 
 
 def cubic(time: Array, value: Array, at: Array) -> Array:
-    """The polynomial through at most four samples, at times (n,)."""
+    """The polynomial through at most four samples, at the times `at` (n,)."""
     return np.array([_lagrange(time, float(t)) @ value for t in at])

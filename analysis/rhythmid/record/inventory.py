@@ -1,4 +1,5 @@
-"""What is in a source: every number that was recorded over and over, a field of a topic or a column of a table, with its times."""
+"""Inventory of a source: every number that was recorded repeatedly, a field of a topic or a column of a table, with
+its times."""
 
 import math
 import re
@@ -34,7 +35,7 @@ Array = NDArray[np.float64]
 OBJECTS = (
     "a table or timetable of MATLAB is an object that others cannot read: there  writetimetable(T, 'run.csv')"
 )
-DEEPEST = 5  # messages within messages that are looked into
+DEEPEST = 5  # nesting depth of messages that are read
 SKIPPED_PACKAGES = (
     "diagnostic_msgs",
     "rcl_interfaces",
@@ -43,27 +44,27 @@ SKIPPED_PACKAGES = (
     "nav_msgs",
     "tf2_msgs",
 )
-VEHICLES = ("nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage")  # where a vehicle or a robot is, as worked out
-FIXED = "/tf_static"  # frames that never move
-FIRST = 200  # messages whose entries are listed: several nodes tell frames in turn
+VEHICLES = ("nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage")  # computed poses of a vehicle or a robot
+FIXED = "/tf_static"  # constant frames
+FIRST = 200  # number of messages whose entries are listed: several nodes may publish frames in turn
 SKIPPED_FIELDS = re.compile(r"header|stamp|.*covariance|orientation|layout|points|time_from_start")
-NO_NUMBERS = "Quaternion"  # a direction in four numbers, of which none alone is an angle
+NO_NUMBERS = "Quaternion"  # an orientation in four numbers, none of which is an angle by itself
 
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """One number as it was recorded.
+    """One recorded number.
 
     Attributes
     ----------
     topic, type, field : of a message; empty for a column.
     column : name of the column; empty for a message's field.
-    joint : the joint whose number it is, where a name stands beside it.
-    side : `left` or `right` where another column differs from it in that only; empty else.
-    said : what names it within its message or table, such as `position` or the heading without its unit.
-    unit, scale : SI unit, empty where not told, and how much of it one recorded unit is.
-    time, value : float64[n], s and as recorded times `scale`; a message's time is that of its receipt.
-    stamped : whether its messages bear stamps.
+    joint : name of its joint, where one is stated.
+    side : `left` or `right` where another column's name differs only in that; else empty.
+    said : its name within the message or table, such as `position` or the heading without its unit.
+    unit, scale : SI unit, empty where not stated, and its factor per recorded unit.
+    time, value : float64[n], [s] and recorded values times `scale`; a message's time is its receive time.
+    stamped : whether its messages have stamps.
     """
 
     said: str
@@ -85,15 +86,15 @@ class Recorded:
 
     @property
     def rate(self) -> float:
-        """Samples a second, 0 for a single one."""
+        """Samples per second, 0 for a single sample."""
         span = float(self.time[-1] - self.time[0]) if len(self.time) > 1 else 0.0
         return (len(self.time) - 1) / span if span > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
 class Inventory:
-    """All numbers of a source that change, how its times are told and why, what was left out, of that what never changes,
-    what a user should know, and of a bag all numbers in the order of their messages."""
+    """All changing numbers of a source; how its times are given, and why; what was left out, including constants;
+    messages for the user; and for a bag all numbers in the order of their messages."""
 
     path: Path
     recorded: tuple[Recorded, ...]
@@ -111,9 +112,9 @@ class Inventory:
 
 
 def inventory(source: str | Path, rate: float | None = None, vehicle: bool = False) -> Inventory:
-    """What is in a bag or table; `rate` [Hz] is that of a table without a time. Raises InputError, one line.
+    """Inventory of a bag or table; `rate` [Hz] is that of a table without a time. Raises InputError, one line.
 
-    With `vehicle`, a bag's odometry and trees of frames are looked into, too.
+    With `vehicle`, a bag's odometry and frame trees are included.
     """
     source = Path(source)
     if not source.exists():
@@ -134,7 +135,7 @@ def inventory(source: str | Path, rate: float | None = None, vehicle: bool = Fal
     return _of_bag(Bag(source), vehicle)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # of numbers near the largest, and NaN of every kind
+@np.errstate(over="ignore", invalid="ignore")  # for numbers near the largest, and NaN of every kind
 def _of_table(table: Table, rate: float | None) -> Inventory:
     columns = list(table.vectors())
     if not columns:
@@ -198,7 +199,7 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
 
 
 def _rows_of(columns: list[tuple[str, Array]]) -> int:
-    """The number of rows that most columns have, of those among which one is called a time before those without."""
+    """The number of rows that most columns have; in a tie, that of a column called a time."""
     lengths = [len(value) for _, value in columns]
     timed = {len(value) for name, value in columns if is_time(name, value)}
     return max(lengths, key=lambda count: (count in timed and lengths.count(count) > 1, lengths.count(count)))
@@ -219,7 +220,7 @@ def _of_bag(bag: Bag, vehicle: bool) -> Inventory:
             continue
         try:
             messages = [typestore(topic).deserialize_cdr(one, topic.type) for one in data]
-        except Exception as error:  # a type that is not defined, or a damaged message
+        except Exception as error:  # an undefined type, or a damaged message
             left.append(f"{name}: {' '.join(str(error).split())}")
             continue
         empty = np.empty(0)
@@ -271,7 +272,7 @@ def _numbers(
         return
     above = (*above, message)
     for name in getattr(message, "__dataclass_fields__", {}):
-        # constants of a type are in capitals, and fields are not: docs.ros.org, ROS 2 interface definitions
+        # constants of a type are capitalised, fields are not: docs.ros.org, ROS 2 interface definitions
         if name.startswith("__") or name.isupper() or SKIPPED_FIELDS.fullmatch(name):
             continue
         value = getattr(message, name)
@@ -288,7 +289,7 @@ def _numbers(
 def _entries(
     values: Any, path: str, said: str, joint: str, above: tuple[Any, ...]
 ) -> Iterator[tuple[str, str, str]]:
-    """The same of every entry of a list; entries are called by name where a list of names stands beside them."""
+    """Path, name and joint of every number in a list; entries have names where a list of names is beside them."""
     if isinstance(values[0], (str, bool, bytes)):
         return
     names = _own_names(values) or _names(above[-1], len(values), NAMES)
@@ -307,18 +308,18 @@ def _entries(
 
 
 def _own_names(values: Any) -> list[str] | None:
-    """Names that the entries of a list bear, each of its own."""
+    """Names contained in the entries of a list, if they are distinct."""
     names = [str(getattr(one, key)) for one in values for key in OWN_NAMES if hasattr(one, key)]
     return names if len(names) == len(values) == len(set(names)) and all(map(_in_path, names)) else None
 
 
 def _in_path(name: Any) -> bool:
-    """Whether a path can hold this name of an entry."""
+    """Whether a path can contain this name of an entry."""
     return isinstance(name, str) and bool(re.fullmatch(r"[^\[\]\s]+", name)) and not name.isdigit()
 
 
 def _names(message: Any, count: int, keys: tuple[str, ...]) -> list[str] | None:
-    """Names of `count` entries that stand in the message, each of its own and such as a path can hold."""
+    """Names of `count` entries in the message, distinct and usable in a path."""
     for key in keys:
         names = getattr(message, key, None)
         if isinstance(names, list) and len(names) == count == len(set(names)):
@@ -328,7 +329,7 @@ def _names(message: Any, count: int, keys: tuple[str, ...]) -> list[str] | None:
 
 
 def header_clock(chosen: Mapping[str, Recorded]) -> tuple[Clock, str]:
-    """Stamps where every chosen topic bears them, else the times of receipt."""
+    """Stamps where every chosen topic has them, else receive times."""
     without = sorted({one.topic for one in chosen.values() if not one.stamped})
     if without:
         return Clock("receive"), f"{', '.join(without)} bears no stamps, so times of receipt are compared"

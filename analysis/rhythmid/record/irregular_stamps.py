@@ -1,29 +1,31 @@
-"""Stamps at irregular times, such as those of a logger that writes when it gets round to it, told from lost samples.
+"""Distinguishes irregular timestamps, such as those of a logger without a fixed rate, from lost samples.
 
-A lost sample leaves a step near two, three, ... periods, as near as the other steps are to one. Where long steps are common and
-lie elsewhere, nothing was lost: the times are irregular, there is no period but the mean step, and only a pause far beyond the
-usual steps is a gap. So they are where steps far shorter than the usual one are common.
+A lost sample leaves a step close to two, three, ... periods, as close as other steps are to one. If long steps are
+common and have other lengths, nothing was lost: the times are irregular, the period is only the mean step, and only
+a pause far longer than the usual steps is a gap. The times are also irregular if steps far shorter than the usual
+one are common.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-COMMON = 0.01  # share of steps that are too long, up to which they are single gaps, of whatever length
-# periods from the nearest whole number of them, as the median of long steps: up to NEAR rounding of stamps puts lost samples there,
-# beyond FAR jitter of less than 0.3 periods does not (a quarter is what times without any period give)
+COMMON = 0.01  # share of long steps up to which they are single gaps of any length
+# median distance of long steps from a whole number of periods: up to NEAR it is rounding of timestamps with lost
+# samples; above FAR jitter of less than 0.3 periods cannot cause it (times without a period give a quarter)
 NEAR, FAR = 0.1, 0.2
-FARTHER = 2.0  # times as far as the other steps from one period, between the two: jitter moves both alike
-SHORTER = 0.9  # of the period, below which the mean step cannot be: losses lengthen it, and jitter leaves it as it is
-USUAL = 0.99  # quantile of irregular steps that is the longest usual one
-PAUSE = (
-    2.0  # times as long, a step is a pause: of steps as random as those between events one in ten thousand
-)
+# ratio of this distance to that of the other steps from one period, used between NEAR and FAR: jitter affects both alike
+FARTHER = 2.0
+# in periods: the mean step cannot be shorter, as losses lengthen it and jitter does not change it
+SHORTER = 0.9
+USUAL = 0.99  # quantile of irregular steps that defines the longest usual one
+# ratio to it above which a step is a pause: one in ten thousand steps between random events is as long
+PAUSE = 2.0
 
 
 def irregular(step: Array, period: float, long: Array) -> bool:
-    """Whether steps (n,) [s] whose nominal period is `period` are those of irregular stamps; `long` (g,) are some of those that are
-    too long and that no short ones make up for; none where they are rare."""
+    """Whether steps (n,) [s] of nominal period `period` come from irregular timestamps. `long` (g,) are some of the
+    steps that are too long and not compensated by short ones; False where they are rare."""
     if len(long) == 0:
         return False
     others = step[step < 1.5 * period]
@@ -33,11 +35,11 @@ def irregular(step: Array, period: float, long: Array) -> bool:
 
 
 def too_short(step: Array, period: float) -> bool:
-    """Whether steps (n,) [s] are on average shorter than what seems their period; a gap counts for as much as one lost sample does."""
+    """Whether steps (n,) [s] are on average shorter than their apparent period; a gap counts as one lost sample."""
     return float(np.mean(np.minimum(step, 2.0 * period))) < SHORTER * period
 
 
 def usual_range(step: Array) -> tuple[float, float]:
-    """Shortest and longest usual step [s] of irregular stamps: all but 1 % are longer, and all but 1 % shorter."""
+    """Shortest and longest usual step [s] of irregular timestamps: the 1 % and 99 % quantiles."""
     shortest, longest = np.quantile(step, [1.0 - USUAL, USUAL], method="nearest")
     return float(shortest), float(longest)

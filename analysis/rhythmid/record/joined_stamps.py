@@ -1,4 +1,4 @@
-"""Stamps in two columns, whole seconds and nanoseconds, as tables of ROS messages have them, joined into one."""
+"""Timestamps in two columns, whole seconds and nanoseconds, as in tables of ROS messages, joined into one."""
 
 import re
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ BILLION = 1e9  # nanoseconds in a second
 
 
 def stamp_pairs(columns: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
-    """The columns of seconds and of nanoseconds of each stamp, by what names it: `header.stamp` of `header.stamp.sec`."""
+    """The columns of seconds and nanoseconds of each stamp, by its name: `header.stamp` for `header.stamp.sec`."""
     nanoseconds = {match[1]: name for name in columns if (match := NANOSECONDS.fullmatch(name))}
     found: dict[str, tuple[str, str]] = {}
     for name in columns:
@@ -23,7 +23,7 @@ def stamp_pairs(columns: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
 
 
 def _go_together(whole: Any, rest: Any) -> bool:
-    """Whether one holds whole numbers, and the other parts of a billion."""
+    """Whether one column holds whole numbers and the other nanoseconds below a second."""
     first, second = np.asarray(whole), np.asarray(rest)
     if (
         first.dtype.kind not in "fiu"
@@ -38,7 +38,7 @@ def _go_together(whole: Any, rest: Any) -> bool:
 
 
 def with_joined_stamps(columns: dict[str, Any]) -> dict[str, Any]:
-    """The columns, and behind them each stamp [s] that two of them make up and that no column is called as."""
+    """The columns, followed by each stamp [s] that two of them form, unless a column already has that name."""
     joined = {
         stamp: np.asarray(columns[whole], dtype=float) + np.asarray(columns[rest], dtype=float) / BILLION
         for stamp, (whole, rest) in stamp_pairs(columns).items()

@@ -13,7 +13,7 @@ Columns = Mapping[str, NDArray[np.float64]]  # field -> (n, joints)
 
 
 def serialised(stamp_ns: NDArray[np.int64], joints: Sequence[str], columns: Columns) -> NDArray[np.uint8]:
-    """CDR bytes of sensor_msgs/msg/JointState messages, uint8[n, size]: one for each stamp, with all joints.
+    """CDR bytes of sensor_msgs/msg/JointState messages, uint8[n, size]: one per stamp, with all joints.
 
     `columns` are float64[n, joints] by field: position [m or rad], velocity, effort.
     """

@@ -1,6 +1,6 @@
 """Records of machines with several joints: a record for each joint, from one recording.
 
-A signals.yaml with `joints:` says of all joints at once which channel is what:
+A signals.yaml with `joints:` maps the channels of all joints at once:
 
     joints: [hip, knee]                               # or {hip: left_hip, …}: the recording's own names
     input:  {topic: /cmd, field: "position[*]", feedforward: "effort[*]"}
@@ -8,10 +8,11 @@ A signals.yaml with `joints:` says of all joints at once which channel is what:
     effort: {field: "effort[*]", taken: before_actuator, sampled: mean}   # or after_actuator; or instant
     base:   {field: "position[rail]"}                 # where the body's base moves along a joint
 
-A channel's `scale` holds for all joints, or is given by joint: `scale: {knee: -1}`; for those that are not named it is 1.
-`[*]` stands for each joint's name in a bag and for its place in the list in a table's array (`column: "q[*]"`); elsewhere in a column's
-name `*` stands for the joint's name (`column: "q_*"`). What has no topic or file takes the output's. A command that is a position is a
-reference for the controllers, see `kind` of the one axis' signals.yaml; `feedforward` is a force that the controllers add.
+A channel's `scale` holds for all joints, or is given by joint: `scale: {knee: -1}`; joints that are not named have
+scale 1. `[*]` stands for each joint's name in a bag and for its index in a table's array (`column: "q[*]"`).
+Elsewhere in a column's name `*` stands for the joint's name (`column: "q_*"`). A channel without topic or file
+takes the output's. A command that is a position is a reference for the controllers, see `kind` in the signals.yaml
+of one axis; `feedforward` is a force that the controllers add.
 """
 
 from collections.abc import Iterable, Mapping
@@ -34,13 +35,16 @@ Sampled = Literal["mean", "instant"]
 _TAKEN: TypeAdapter[Taken] = TypeAdapter(Taken)
 _SAMPLED: TypeAdapter[Sampled] = TypeAdapter(Sampled)
 _TEXT: TypeAdapter[str] = TypeAdapter(str)
-SHARED = ("topic", "file", "time")  # what a channel takes from the output's where it says nothing
+SHARED = ("topic", "file", "time")  # keys that a channel takes from the output by default
 
 
 @dataclass(frozen=True)
 class JointSignals:
-    """Contents of a signals.yaml with `joints:`, as the signals of each joint by itself; `base` of the base's joint, `sampled` whether an
-    effort is the mean over a sample period or that of an instant, where that is said."""
+    """Content of a signals.yaml with `joints:`, as signals of each single joint.
+
+    `base` holds the signals of the base's joint. `sampled` says whether an effort is the mean over a sample period or
+    instantaneous, where that is declared.
+    """
 
     joints: Mapping[str, Signals]
     base: Signals | None
@@ -50,19 +54,19 @@ class JointSignals:
 
     @classmethod
     def load(cls, path: str | Path) -> "JointSignals":
-        """The signals.yaml at `path`. Raises InputError naming line and key of what is wrong."""
+        """The signals.yaml at `path`. Raises InputError with line and key of an error."""
         return _joint_signals(read(path), Path(path))
 
     @classmethod
     def from_text(cls, text: str, path: str | Path = "signals.yaml") -> "JointSignals":
-        """The signals in a YAML text that stands for the file `path`."""
+        """The signals in a YAML text; `path` is the file name used in messages."""
         return _joint_signals(parse(text, str(path)), Path(path))
 
 
 @dataclass(frozen=True, eq=False)
 class JointRecord:
-    """One recording of a machine: a record for each joint, one of the base's joint where it moves along one; the times of all
-    count from the same zero."""
+    """One recording of a machine: a record for each joint, and one of the base's joint where the base moves along
+    one. All times have the same zero."""
 
     name: str
     joints: Mapping[str, Record]
@@ -76,19 +80,19 @@ class JointRecord:
         return dict(self.joints) if self.base is None else {**self.joints, "base": self.base}
 
     def cut(self, start: float, end: float) -> "JointRecord":
-        """What lies within [start, end) seconds."""
+        """The part within [start, end) seconds."""
         joints = {name: record.cut(start, end) for name, record in self.joints.items()}
         return replace(self, joints=joints, base=None if self.base is None else self.base.cut(start, end))
 
     @property
     def span(self) -> tuple[float, float]:
-        """First and last time [s] at which every joint's position was recorded."""
+        """First and last time [s] at which the positions of all joints are recorded."""
         times = [record.output.time for record in self.joints.values()]
         return max(float(one[0]) for one in times), min(float(one[-1]) for one in times)
 
 
 def names_joints(signals: str | Path) -> bool:
-    """Whether a signals.yaml is of several joints. Raises InputError where it cannot be read."""
+    """Whether a signals.yaml is for several joints. Raises InputError where it cannot be read."""
     value = read(signals).value
     return isinstance(value, dict) and "joints" in value
 
@@ -100,7 +104,7 @@ def load_joint_records(paths: Iterable[str | Path], signals: JointSignals | str 
 
 
 def joint_records(paths: Iterable[str | Path], signals: str | Path | None) -> list[JointRecord]:
-    """Those recordings of which the signals, or the paths themselves, name joints. Raises InputError as `read_record` does."""
+    """The recordings whose signals, or whose own paths, name joints. Raises InputError as `read_record` does."""
     named = [(path, signals or path) for path in paths]
     return [
         read_joint_record(path, JointSignals.load(own))
@@ -110,7 +114,8 @@ def joint_records(paths: Iterable[str | Path], signals: str | Path | None) -> li
 
 
 def read_joint_record(source: str | Path, signals: JointSignals) -> JointRecord:
-    """Read one recording: a bag, or a table whose columns the signals name. A signals.yaml that names its tables stands for itself."""
+    """Read one recording: a bag, or a table whose columns the signals name. A signals.yaml that names its tables is
+    its own source."""
     found = {joint: _read(source, one, signals.path) for joint, one in signals.joints.items()}
     base = None if signals.base is None else _read(source, signals.base, signals.path)
     return JointRecord(next(iter(found.values())).name, found, base, signals.taken, signals.sampled)
@@ -119,7 +124,8 @@ def read_joint_record(source: str | Path, signals: JointSignals) -> JointRecord:
 def _read(source: str | Path, signals: Signals, path: Path) -> Record:
     same = Path(source).resolve() == path.resolve()
     record = read_tables(signals) if same else read_record(source, signals)
-    if np.ptp(record.output.value) == 0.0:  # of one joint among others its efforts alone tell nothing
+    # with several joints, one that stands still contributes nothing by its effort alone
+    if np.ptp(record.output.value) == 0.0:
         raise InputError(f"{record.name}: {record.output.source} never changes; nothing is learnt from it")
     return record
 
@@ -170,7 +176,7 @@ def _joint_signals(document: Node, path: Path) -> JointSignals:
 
 
 def _names(node: Node) -> dict[str, str]:
-    """By the joint's name in the model, the one in the recording."""
+    """Names of the joints in the recording, by their names in the model."""
     if isinstance(node.value, dict):
         found = {name: validated(one, _TEXT) for name, one in node.mapping().items()}
     else:
@@ -184,7 +190,7 @@ def _names(node: Node) -> dict[str, str]:
 
 
 def _with_shared(node: Node, output: Node) -> Node:
-    """A channel that takes topic, file and time from the output where it has neither."""
+    """A channel with the output's topic, file and time where it states none."""
     options, usual = node.mapping(), output.mapping()
     if "topic" in options or "file" in options:
         return node
@@ -192,7 +198,7 @@ def _with_shared(node: Node, output: Node) -> Node:
 
 
 def _check_scale(channel: Node | None, names: Iterable[str]) -> None:
-    """Raise InputError where a channel has a scale for what is no joint."""
+    """Raise InputError where a channel has a scale for a name that is no joint."""
     scale = channel.value.get("scale") if channel is not None and isinstance(channel.value, dict) else None
     if scale is not None and isinstance(scale.value, dict):
         for joint, one in scale.value.items():
@@ -201,7 +207,7 @@ def _check_scale(channel: Node | None, names: Iterable[str]) -> None:
 
 
 def _for_joint(node: Node, joint: str, place: int) -> Node:
-    """The document with the joint in the place of every star."""
+    """The document with the joint inserted for every star."""
     if isinstance(node.value, dict) and node.path.endswith("scale"):
         own = node.value.get(joint)
         return replace(node, value=1.0) if own is None else own

@@ -1,4 +1,4 @@
-"""Tables in JSON: an object a line, a list of objects, or lists by name, within one another (RFC 8259, jsonlines.org)."""
+"""Tables in JSON: one object per line, a list of objects, or named lists, also nested (RFC 8259, jsonlines.org)."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,14 +13,16 @@ from rhythmid.record.text_file import opened
 
 LINES = (".jsonl", ".ndjson")
 JSON = (".json", *LINES)
-UNNAMED = "values"  # what a list without a name is called
+UNNAMED = "values"  # name of a list without one
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Columns by the path to them: `state.q` where each row is an object that holds others, float64[n, k] where each holds a list.
+    """Columns by path: `state.q` where each row is an object that contains others, float64[n, k] where each row
+    holds a list.
 
-    What some rows lack is NaN there, and what is neither a list nor in one is left out. Raises ValueError where it is no JSON; a last
-    line that breaks off, as where a logger was switched off, is left out.
+    A value that some rows lack is NaN there. Values that are neither a list nor in one are left out. Raises
+    ValueError where the file is not JSON. An incomplete last line, as from a logger that was switched off, is left
+    out.
     """
     with opened(path) as file:
         text = file.read()
@@ -32,12 +34,13 @@ def read_json(path: Path) -> dict[str, Any]:
             raise
         found = list(_rows(lines))
     if isinstance(found, Mapping) and not any(isinstance(one, (Mapping, list)) for one in found.values()):
-        found = [found]  # a file of one line
+        found = [found]  # a file with one line
     return dict(_lists("", found))
 
 
 def _rows(lines: Sequence[tuple[int, str]]) -> Iterator[Any]:
-    """What each line holds. Raises ValueError with the number of one that is no JSON, but for a last one that breaks off."""
+    """Content of each line. Raises ValueError with the number of a line that is not JSON, except for an incomplete
+    last one."""
     for number, line in lines:
         try:
             yield json.loads(line)
@@ -54,7 +57,8 @@ def _lists(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(value, list):
         yield from _columns(name, value)
     elif isinstance(value, Mapping):
-        if len(value) > 1 and all(key.isdecimal() for key in value):  # a list by the numbers of its rows
+        # a list as an object with row numbers as keys
+        if len(value) > 1 and all(key.isdecimal() for key in value):
             yield from _columns(name, list(value.values()))
             return
         if (named := _named_columns(value)) is not None:
@@ -65,7 +69,7 @@ def _lists(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _named_columns(value: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The columns of rows whose names stand in a list of their own beside them, as pandas writes them; None where there are no such."""
+    """The columns of rows whose names are in a separate list, as pandas writes them; None where there is none."""
     rows = [
         one
         for one in value.values()
@@ -87,7 +91,7 @@ def _named_columns(value: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def _columns(name: str, rows: Sequence[Any]) -> Iterator[tuple[str, Any]]:
-    """Columns of what each row holds; None where a row holds nothing."""
+    """Columns from the content of the rows; None marks an empty row."""
     there = [one for one in rows if one is not None]
     if not there:
         return
@@ -111,7 +115,7 @@ def _columns(name: str, rows: Sequence[Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _words(cells: Sequence[str]) -> Any:
-    """Numbers that are written as words, times in seconds, or words."""
+    """Numbers written as text, times in seconds, or the texts themselves."""
     numbers = [number_of(cell, ".") for cell in cells]
     if all(number is not None for number in numbers):
         return np.array(numbers, dtype=np.float64)
@@ -120,7 +124,7 @@ def _words(cells: Sequence[str]) -> Any:
 
 
 def _is_number(cell: Any) -> bool:
-    """Whether it is a number, true or false, or nothing."""
+    """Whether a cell is a number, true, false or null."""
     return cell is None or isinstance(cell, (int, float))
 
 

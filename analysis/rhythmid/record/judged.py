@@ -26,13 +26,14 @@ def judged(
 
     Parameters
     ----------
-    source : where it comes from.
-    recorded, lateness : (m,) times [s] in the order of recording, and receipt less stamp [s]; None where there is no stamp.
+    source : origin of the channel.
+    recorded, lateness : (m,) times [s] in the order of recording, and receive time minus stamp [s]; None without stamps.
     time, value : (n,) times [s] in order, without duplicates, and values; NaN where one is missing.
-    stamped : whether it is the output with stamps of its own, of whose jitter the samples tell; a declared rate makes no stamps.
-    missing, conflicts : messages without the channel's entry, and duplicates with other values.
+    stamped : whether it is the output with its own stamps, whose jitter the samples show; a declared rate gives no
+        stamps.
+    missing, conflicts : messages without the channel's entry, and duplicates with different values.
     """
-    told = np.isfinite(value)  # what is infinite is refused where it is used
+    told = np.isfinite(value)  # infinite values are rejected where they are used
     present = value[told]
     skew = None if lateness is None else clock_skew(recorded, lateness)
     jitter = stamp_jitter([(time[told], present)]) if stamped else None

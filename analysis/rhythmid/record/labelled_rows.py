@@ -1,4 +1,4 @@
-"""Logs that say in every row what each number is: `Time: 5001 Position: 594 Current: 511`, as a program prints them for its user."""
+"""Logs with a label for each number in every row: `Time: 5001 Position: 594 Current: 511`, as printed for a user."""
 
 import re
 from collections import Counter
@@ -12,7 +12,7 @@ from rhythmid.record.heading import is_unit
 from rhythmid.record.text_cells import content
 from rhythmid.record.text_rows import SHOWN
 
-# a label that begins with a letter, a colon or an equals sign, a number, and what is glued to it or stands alone behind it: its unit
+# a label that begins with a letter, a colon or an equals sign, a number, and directly or separately after it the unit
 PAIR = re.compile(
     r"[\s,;|]*(?P<label>[^\W\d][^:=,;|\t]*?)\s*[:=]\s*"
     r"(?P<number>[-+]?(?:\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?|nan|inf))(?P<glued>[^\s,;|\d:=]*)"
@@ -20,20 +20,20 @@ PAIR = re.compile(
     re.IGNORECASE,
 )
 SEPARATORS = " \t\r\n,;|"
-MOSTLY = 0.5  # share of the first lines that have the same labels, from which they are the rows of a table
-LEAST_ROWS = 3  # with the same labels: of fewer, they are what a head says of a table
+MOSTLY = 0.5  # share of the first lines with the same labels above which they are rows of a table
+LEAST_ROWS = 3  # least number of rows with the same labels: fewer may be the head of a table
 
 
 @dataclass(frozen=True, eq=False)
 class Labelled:
-    """Columns by label, and what a user should know of the lines that are no rows."""
+    """Columns by label, and messages about the lines that are not rows."""
 
     columns: dict[str, NDArray[np.float64]]
     notes: tuple[str, ...] = ()
 
 
 def labels_of(begin: Sequence[str]) -> tuple[str, ...] | None:
-    """The labels that most of these lines have, with the units where they stand behind the numbers; None where most have none."""
+    """The labels that most of these lines have, with the units after the numbers; None where most lines have none."""
     lines = [line for line in begin if content(line)]
     found = Counter(tuple(name for name, _ in pairs) for line in lines if (pairs := pairs_of(line)))
     labels, count = found.most_common(1)[0] if found else ((), 0)
@@ -43,7 +43,7 @@ def labels_of(begin: Sequence[str]) -> tuple[str, ...] | None:
 
 
 def read_labelled(lines: Iterable[str], labels: Sequence[str]) -> Labelled:
-    """The rows that have these labels; lines without them are passed over, and told."""
+    """The rows with these labels; other lines are skipped and reported."""
     rows: list[list[float]] = []
     first, passed = "", 0
     for number, line in enumerate(lines, start=1):
@@ -62,7 +62,8 @@ def read_labelled(lines: Iterable[str], labels: Sequence[str]) -> Labelled:
 
 
 def pairs_of(line: str) -> list[tuple[str, float]]:
-    """Label, with the unit where one is told, and number of every pair in a line; none where it holds anything else."""
+    """Label, with its unit where given, and number of every pair in a line; empty where the line contains anything
+    else."""
     found: list[tuple[str, float]] = []
     place, text = 0, line.rstrip()
     while match := PAIR.match(text, place):
@@ -80,7 +81,7 @@ def pairs_of(line: str) -> list[tuple[str, float]]:
 
 
 def _parted(label: str) -> tuple[str, str]:
-    """The unit of the number before a label, and the label: of `deg Motor current` it is `deg`."""
+    """The unit of the number before a label, and the label itself: for `deg Motor current` the unit is `deg`."""
     unit, _, rest = label.partition(" ")
     return (unit, rest.strip()) if rest.strip() and is_unit(unit) else ("", label)
 

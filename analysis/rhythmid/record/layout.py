@@ -1,8 +1,8 @@
-"""Where the numbers of a serialised message stand (CDR, the encoding of ROS 2 messages).
+"""Byte positions of the numbers in a serialised message (CDR, the encoding of ROS 2 messages).
 
-The places depend on nothing but the lengths of the strings and lists within the message. So they are worked out for one
-message, and every other message whose length words are the same has the same layout: then its numbers can be gathered
-by array, which is some ten times faster than deserialising messages one by one.
+The positions depend only on the lengths of the strings and lists in the message. So they are computed for one
+message. Every other message with the same length words has the same layout, and its numbers can be read by array.
+That is about ten times faster than deserialising messages one by one.
 """
 
 import struct
@@ -17,9 +17,9 @@ from rosbags.typesys.base import normalize_fieldname
 from rhythmid.record.block import Block, gather
 from rhythmid.record.field import NAMES, OWN_NAMES, Field, TypeFields
 
-HEAD = 4  # bytes of encapsulation in front of every message; alignment counts from behind it
-LITTLE_ENDIAN = 0x0100  # the first two of them, plain CDR in little-endian byte order, read as a number
-_PARTS_AT_MOST = 1000  # a message with more sub-messages and strings in its lists is not laid out
+HEAD = 4  # bytes of encapsulation before every message; alignment is relative to their end
+LITTLE_ENDIAN = 0x0100  # the first two of them, plain CDR in little-endian byte order, as a number
+_PARTS_AT_MOST = 1000  # a message with more sub-messages and strings in its lists gets no layout
 NUMBERS = {
     "bool": "?", "byte": "u1", "char": "u1", "octet": "u1", "int8": "i1", "uint8": "u1", "int16": "<i2", "uint16": "<u2",
     "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8", "float32": "<f4", "float64": "<f8",
@@ -27,7 +27,7 @@ NUMBERS = {
 
 
 class Unsupported(Exception):
-    """This message has no layout that could be worked out; it may still be deserialised."""
+    """No layout can be computed for this message; it may still be deserialised."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Text:
 
 
 class Layout:
-    """Layout of one little-endian CDR message. `root` maps field names to what stands there, as deep as it goes."""
+    """Layout of one little-endian CDR message. `root` maps field names to their contents, nested as the message is."""
 
     def __init__(self, message: bytes, msgtype: str, types: TypeFields) -> None:
         if len(message) < HEAD or int.from_bytes(message[:2], "little") != LITTLE_ENDIAN:
@@ -66,7 +66,7 @@ class Layout:
         self._types = types
         self._at = HEAD
         self._parts = 0
-        self.words: list[tuple[int, int]] = []  # place and value of every length word
+        self.words: list[tuple[int, int]] = []  # position and value of every length word
         try:
             self.root: dict[str, Any] = self._part(msgtype)
         except (struct.error, KeyError, UnicodeDecodeError) as error:
@@ -118,7 +118,7 @@ class Layout:
         return text
 
     def locate(self, field: Field) -> tuple[Number, list[Text]]:
-        """The number that `field` means, and the names of list entries on which that depends.
+        """The number at the path `field`, and the names of list entries on which its position depends.
 
         Raises LookupError when this message has no such entry.
         """
@@ -141,9 +141,9 @@ class Layout:
         return here, names
 
     def fits(self, block: Block, numbers: list[Number], names: list[Text]) -> bool:
-        """Whether `numbers` stand at the same place in all messages of the block, by the same `names`.
+        """Whether `numbers` are at the same positions in all messages of the block, with the same `names`.
 
-        Only the length words in front of the last number matter; what follows it may vary.
+        Only the length words before the last number matter; anything after it may vary.
         """
         end = max((number.at + np.dtype(number.dtype).itemsize for number in numbers), default=HEAD)
         if int(block.size.min()) < end:
@@ -158,12 +158,13 @@ class Layout:
     @staticmethod
     def read(block: Block, number: Number) -> NDArray[np.float64]:
         """The number in all messages of the block, float64[n]."""
-        with np.errstate(invalid="ignore"):  # a signalling NaN, which is read as any other
+        with np.errstate(invalid="ignore"):  # a signalling NaN is read like any other
             return gather(block.buffer, block.start + number.at, number.dtype).astype(np.float64)
 
 
 def _position(name: str, above: list[dict[str, Any]], entries: Any) -> tuple[int, list[Text]]:
-    """Position of the entry called `name`, by the names that entries bear or by the nearest list of names, and the names that decide it."""
+    """Position of the entry called `name`, from names within the entries or from the nearest list of names, and the
+    names that decide it."""
     own = (
         [entry[key] for entry in entries for key in OWN_NAMES if key in entry]
         if isinstance(entries, list)
@@ -186,7 +187,7 @@ def _position(name: str, above: list[dict[str, Any]], entries: Any) -> tuple[int
 
 
 def value_of(message: Any, field: Field) -> float:
-    """The number that `field` means in a deserialised message. Raises LookupError, saying why, if there is none."""
+    """The number at the path `field` in a deserialised message. Raises LookupError with the reason if there is none."""
     here = message
     above: list[Any] = []
     done = ""

@@ -1,4 +1,4 @@
-"""Pointers that Git LFS leaves in the place of files that were not fetched (https://git-lfs.com/spec/v1)."""
+"""Git LFS pointers in place of files that were not fetched (https://git-lfs.com/spec/v1)."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ FIRST_LINE = b"version https://git-lfs.github.com/spec/"
 
 
 def check_content(path: Path) -> None:
-    """Raise InputError where a file holds no data but a pointer to them. Of one that cannot be opened its reader tells."""
+    """Raise InputError where a file is only a pointer to data. A file that cannot be opened is left to its reader."""
     try:
         with path.open("rb") as file:
             start = file.read(len(FIRST_LINE))

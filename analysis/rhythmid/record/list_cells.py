@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from rhythmid.record.text_cells import is_missing, number_of
 from rhythmid.record.text_rows import Rows
 
-# brackets around anything without brackets, within a call as of array, float32 or tensor, or without one
+# brackets around text without brackets, possibly within a call such as array, float32 or tensor
 LIST = re.compile(r"(?:[\w.]+\((?:'\w',\s*)?)?[\[(]([^\[\]()]*)[\])](?:,\s*\w+=[\w.]+)?\)?")
-BETWEEN = re.compile(r"[,;\s]+")  # numbers of a list
+BETWEEN = re.compile(r"[,;\s]+")  # separator of the numbers of a list
 
 
 def list_of(cell: str) -> list[float] | None:
-    """The numbers of a list, None where a cell holds none; NaN stands for one that is missing."""
+    """The numbers of a list, NaN for a missing one; None where a cell holds no list."""
     if cell[-1:] not in ("]", ")"):
         return None
     found = LIST.fullmatch(cell)
@@ -27,7 +27,7 @@ def list_of(cell: str) -> list[float] | None:
 
 
 def lists_of(cells: Sequence[str], rows: Rows, column: int) -> NDArray[np.float64] | None:
-    """The lists of a column, float64[n, k], NaN where a cell is empty; None where the first that is filled holds none.
+    """The lists of a column, float64[n, k], NaN where a cell is empty; None where the first filled cell holds no list.
 
     Raises ValueError where another row has another number of values, or no list.
     """

@@ -24,10 +24,10 @@ def load(
         A bag directory, an .mcap or .db3 file, a table (.csv, .mat, .npz, .parquet), or a signals.yaml that names
         tables.
     signals
-        Which channel is what: a signals.yaml, or its content as a mapping; by default the topics of rhythmid's own
+        Mapping of the channels: a signals.yaml, or its content as a mapping; by default the topics of rhythmid's own
         nodes.
     use
-        First and last second of the recording that are used.
+        Start and end [s] of the part of the recording to use.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def load(
     Raises
     ------
     InputError
-        In one line, where the source cannot be read or lacks a channel that `signals` names.
+        One line, where the source cannot be read or lacks a channel that `signals` names.
 
     Examples
     --------

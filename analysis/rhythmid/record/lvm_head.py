@@ -1,4 +1,4 @@
-"""LabVIEW's measurement files (.lvm): text tables below headers whose lines are pairs of a word and what it says.
+"""LabVIEW measurement files (.lvm): text tables below headers with one key and value per line.
 
 National Instruments, Specification for the LabVIEW Measurement File (.lvm), 2020.
 """
@@ -9,16 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FIRST = "LabVIEW Measurement"  # the first line begins so
+FIRST = "LabVIEW Measurement"  # start of the first line
 END = "***End_of_Header***"
-TIME, REMARK = "X_Value", "Comment"  # names of the columns before and behind the channels
+TIME, REMARK = "X_Value", "Comment"  # names of the columns before and after the channels
 
 
 @dataclass(frozen=True)
 class LvmHead:
-    """How many lines its headers have, the units of the channels, empty where none are told, and the times by start and step.
+    """Number of header lines, the units of the channels (empty where none are given), and the times by start and step.
 
-    `step` is 0 where each row tells its time, in a column before the channels.
+    `step` is 0 where each row states its time, in a column before the channels.
     """
 
     lines: int
@@ -27,7 +27,7 @@ class LvmHead:
     step: float = 0.0
 
     def names(self, head: Sequence[str], count: int) -> list[str]:
-        """The names of `count` columns, without that of the remarks where the rows end before it, and the units of all."""
+        """The names of `count` columns, without the remark column where rows end before it, and the units of all."""
         kept = list(head[:-1] if len(head) == count + 1 and head[-1] in ("", REMARK) else head)
         if not kept or kept[0] not in ("", TIME):
             return kept
@@ -36,12 +36,12 @@ class LvmHead:
         return [f"{name} [{unit}]" if unit else name for name, unit in zip(kept, units, strict=False)]
 
     def times(self, count: int) -> NDArray[np.float64]:
-        """Times (n,) [s] of rows that do not tell theirs."""
+        """Times (n,) [s] of rows without a time."""
         return self.start + self.step * np.arange(count, dtype=np.float64)
 
 
 def lvm_head(lines: Sequence[str]) -> LvmHead | None:
-    """The headers of a file that begins with these lines; None where it is no measurement file of LabVIEW."""
+    """The headers of a file that begins with these lines; None where it is no LabVIEW measurement file."""
     if not lines or not lines[0].lstrip("\ufeff").startswith(FIRST):
         return None
     ends = [place for place, line in enumerate(lines) if line.startswith(END)]

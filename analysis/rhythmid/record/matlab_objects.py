@@ -1,8 +1,8 @@
-"""Objects in MATLAB's files, which keep their numbers in a form that MATLAB alone reads: what to tell of a file that holds nothing else."""
+"""Message about MATLAB files with nothing but objects, whose numbers only MATLAB can read."""
 
 from collections.abc import Mapping
 
-# what MATLAB is told to write an object of a class as a table
+# MATLAB commands that write an object of a class as a table
 WRITTEN_BY = {
     "Simulink.SimulationData.Dataset": "writetimetable(extractTimetable({name}), 'run.csv')",
     "timeseries": "writetimetable(timeseries2timetable({name}), 'run.csv')",
@@ -12,7 +12,7 @@ WRITTEN_BY = {
 
 
 def complaint_of_objects(objects: Mapping[str, str]) -> str:
-    """Why a file of nothing but objects, given as their classes by name, holds no table, and what to do."""
+    """Reason why a file with nothing but objects, given as their classes by name, holds no table, and what to do."""
     name, kind = next(iter(objects.items()))
     written = WRITTEN_BY.get(kind, "").format(name=name)
     mend = f"in MATLAB  {written}" if written else "in MATLAB save its numbers as arrays"

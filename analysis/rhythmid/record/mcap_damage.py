@@ -1,4 +1,4 @@
-"""What of an MCAP file is damaged: chunks found again behind a break, checksums compared, counts of what was lost."""
+"""Damage of MCAP files: finds chunks after a break, compares checksums, counts lost messages."""
 
 import struct
 import zlib
@@ -20,20 +20,19 @@ from rhythmid.record.mcap_writer import (
 
 FOOTER_SIZE = 9 + 8 + 8 + 4
 _DATA_END_SIZE = 9 + 4
-_PRIVATE = 0x80  # opcodes from here on are free for applications
+_PRIVATE = 0x80  # opcodes from here on are reserved for applications
 _METHODS = (b"", b"zstd", b"lz4")
-_WINDOW = 2**24  # bytes looked through at a time,
+_WINDOW = 2**24  # bytes searched at a time,
 _SEARCHED = 2**28  # and in all: no chunk is that long
-_CHAINED = 8  # records, each beginning where the one before ends: no other bytes look like that
-MESSAGE_HEAD_SIZE = (
-    2 + 4 + 8 + 8
-)  # bytes of channel, sequence number and two times in front of the message's data
+# consecutive records, each starting where the one before ends: other bytes do not look like that
+_CHAINED = 8
+MESSAGE_HEAD_SIZE = 2 + 4 + 8 + 8  # bytes of channel, sequence number and two times before the message's data
 
 _head = struct.Struct("<BQ")
 
 
 def is_record(data: bytes | memoryview, at: int, end: int) -> bool:
-    """Whether a record that the format knows may stand at `at`."""
+    """Whether a known record may be at `at`."""
     if at + 9 > end:
         return False
     op, size = _head.unpack_from(data, at)
@@ -45,7 +44,7 @@ def is_record(data: bytes | memoryview, at: int, end: int) -> bool:
 
 
 def begins_chunk(data: bytes | memoryview, at: int, end: int) -> bool:
-    """Whether a chunk begins at `at`, wherever it ends: the lengths within it must agree."""
+    """Whether a chunk begins at `at`, wherever it ends: the lengths within it must be consistent."""
     if at + 9 + 40 > end or data[at] != CHUNK:
         return False
     size = _head.unpack_from(data, at)[1]
@@ -56,12 +55,12 @@ def begins_chunk(data: bytes | memoryview, at: int, end: int) -> bool:
 
 
 def is_chunk(data: bytes | memoryview, at: int, end: int) -> bool:
-    """Whether a whole chunk stands at `at`."""
+    """Whether a complete chunk is at `at`."""
     return begins_chunk(data, at, end) and _head.unpack_from(data, at)[1] <= end - at - 9
 
 
 def is_header(data: bytes | memoryview) -> bool:
-    """Whether the header record that follows the magic bytes is whole: the lengths within it must agree."""
+    """Whether the header record after the magic bytes is complete: the lengths within it must be consistent."""
     at = len(MAGIC)
     if at + 17 > len(data) or data[at] != HEADER:
         return False
@@ -72,12 +71,13 @@ def is_header(data: bytes | memoryview) -> bool:
 
 
 def find_chunk(data: memoryview, at: int) -> int | None:
-    """Where the next whole chunk begins, from `at` on; None if there is none within reach."""
+    """Position of the next complete chunk from `at` on; None if there is none within reach."""
     return _find(data, at, CHUNK, is_chunk)
 
 
 def find_messages(data: memoryview, at: int) -> int | None:
-    """Where records follow one another again, a message first, from `at` on; None if there are none within reach."""
+    """Position from `at` on where consecutive records start again, with a message first; None if there are none
+    within reach."""
     return _find(data, at, MESSAGE, _are_messages)
 
 
@@ -87,7 +87,7 @@ def _find(data: memoryview, at: int, op: int, stands: Callable[[memoryview, int,
         window = np.frombuffer(data[begin : min(end, begin + _WINDOW + 9)], dtype=np.uint8)
         if len(window) < 9:
             return None
-        high = window[6:-2] | window[7:-1] | window[8:]  # of a length, bytes that are zero below a terabyte
+        high = window[6:-2] | window[7:-1] | window[8:]  # high bytes of a length, zero below a terabyte
         for place in np.flatnonzero((window[:-8] == op) & (high == 0)).tolist():
             if stands(data, begin + place, end):
                 return begin + place
@@ -95,7 +95,7 @@ def _find(data: memoryview, at: int, op: int, stands: Callable[[memoryview, int,
 
 
 def _are_messages(data: memoryview, at: int, end: int) -> bool:
-    """Whether records stand at `at` one behind the other, the first of them a message."""
+    """Whether consecutive records start at `at`, with a message first."""
     if at + 9 > end or _head.unpack_from(data, at)[1] < MESSAGE_HEAD_SIZE:
         return False
     for _ in range(_CHAINED):
@@ -109,7 +109,8 @@ def _are_messages(data: memoryview, at: int, end: int) -> bool:
 
 
 def messages_in_chunk(data: bytes | memoryview, at: int) -> dict[int, int]:
-    """Messages by channel of the chunk that ends at `at`, as the index behind it tells; empty where there is none."""
+    """Number of messages by channel in the chunk that ends at `at`, from the index after it; empty where there is
+    none."""
     found: dict[int, int] = {}
     while at + 15 <= len(data) and data[at] == MESSAGE_INDEX and is_record(data, at, len(data)):
         size = _head.unpack_from(data, at)[1]
@@ -120,7 +121,7 @@ def messages_in_chunk(data: bytes | memoryview, at: int) -> dict[int, int]:
 
 
 def summary_start(data: bytes | memoryview) -> int:
-    """Where the summary begins; 0 if the file has none or its end is damaged."""
+    """Position of the summary; 0 if the file has none or its end is damaged."""
     footer = len(data) - len(MAGIC) - FOOTER_SIZE
     if footer < 0 or bytes(data[-len(MAGIC) :]) != MAGIC or data[footer] != FOOTER:
         return 0
@@ -129,7 +130,7 @@ def summary_start(data: bytes | memoryview) -> int:
 
 
 def counted(data: bytes | memoryview) -> dict[int, int]:
-    """Messages by channel, as the summary counts them; empty if it does not."""
+    """Number of messages by channel according to the summary; empty if it does not state them."""
     at, end = summary_start(data), len(data) - len(MAGIC) - FOOTER_SIZE
     with suppress(struct.error):
         while at and is_record(data, at, end):
@@ -143,7 +144,7 @@ def counted(data: bytes | memoryview) -> dict[int, int]:
 
 
 def wrong_checksums(data: bytes | memoryview) -> list[str]:
-    """What the checksums of a finished file say against it, one phrase each; a checksum of 0 says nothing."""
+    """Checksum errors of a finished file, one phrase each; a checksum of 0 is not compared."""
     if bytes(data[-len(MAGIC) :]) != MAGIC:
         return ["its end is damaged or missing"]
     summary, footer = summary_start(data), len(data) - len(MAGIC) - FOOTER_SIZE

@@ -1,7 +1,8 @@
 """MCAP files read front to back (format: https://mcap.dev/spec).
 
-The index at the end of a file is not needed, so that a file whose recorder was killed reads like any other, up to the
-last whole message. One whose beginning is damaged is read from its first whole chunk on. Records are found by hopping from length to length; numbers are then gathered by array.
+The index at the end of a file is not needed. So a file whose recorder was killed is read like any other, up to the
+last complete message. A file with a damaged beginning is read from its first complete chunk on. Records are located
+by their lengths; numbers are then read by array.
 """
 
 import mmap
@@ -35,12 +36,12 @@ from rhythmid.record.mcap_damage import (
 from rhythmid.record.mcap_writer import CHANNEL, CHUNK, FOOTER, MAGIC, MESSAGE, SCHEMA
 
 _head = struct.Struct("<BQ")
-_MESSAGE_BATCH = 100_000  # messages that lie outside of chunks are handed out in blocks of at most this many
+_MESSAGE_BATCH = 100_000  # messages outside of chunks are returned in blocks of at most this size
 
 
 class McapReader:
-    """One MCAP file. After `blocks` is exhausted, `topics` lists all topics, `truncated` tells whether the file breaks
-    off, and `damage` what had to be skipped."""
+    """One MCAP file. After `blocks` is exhausted, `topics` lists all topics, `truncated` says whether the file is
+    incomplete, and `damage` lists what was skipped."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -49,7 +50,7 @@ class McapReader:
         self.damage: list[str] = []
         self._schemas: dict[int, tuple[str, str, str]] = {}
         self._channels: dict[int, Topic] = {}
-        self._undeclared: Counter[int] = Counter()  # messages by channel of which nothing says the topic
+        self._undeclared: Counter[int] = Counter()  # messages by channel of unknown topic
         try:
             with path.open("rb") as file:
                 size = file.seek(0, os.SEEK_END)
@@ -61,11 +62,11 @@ class McapReader:
             self._begin = self._behind_damaged_beginning()
 
     def _behind_damaged_beginning(self) -> int:
-        """Where the first chunk begins of a file whose first bytes are not what was written."""
+        """Position of the first chunk in a file whose first bytes are damaged."""
         magic = bytes(self._data[: len(MAGIC)]) == MAGIC
         first = find_chunk(self._data, 0)
         first = find_messages(self._data, 0) if first is None else first
-        if magic and first in (None, len(MAGIC)):  # breaks off there, or has no header
+        if magic and first in (None, len(MAGIC)):  # ends there, or has no header
             return len(MAGIC)
         if first is None:
             raise InputError(
@@ -85,7 +86,7 @@ class McapReader:
             if whole and self._data[at] == FOOTER:
                 self._tell_undeclared()
                 return
-            if whole and self._data[at] == MESSAGE:  # the scan hands out so many at a time
+            if whole and self._data[at] == MESSAGE:  # the scan returns limited batches
                 continue
             if is_chunk(self._data, at, end):
                 yield from self._chunk(at + 9, at + 9 + size, wanted, whole=True)
@@ -96,7 +97,7 @@ class McapReader:
                 following = find_messages(self._data, last + 1)
             if following is None:
                 break
-            self._declare_from_summary()  # what is skipped may have declared topics
+            self._declare_from_summary()  # the skipped part may have declared topics
             self.damage.append(f"bytes {at} to {following} are damaged and were skipped")
             at = following
         self.truncated = True
@@ -111,11 +112,11 @@ class McapReader:
         ]
 
     def wrong_checksums(self) -> list[str]:
-        """What the checksums of a finished file say against it, one phrase each."""
+        """Checksum errors of a finished file, one phrase each."""
         return [] if self.truncated else wrong_checksums(self._data)
 
     def counted(self) -> dict[str, int]:
-        """Messages by topic, as the end of the file counts them; empty if it does not."""
+        """Number of messages by topic according to the end of the file; empty if it does not state them."""
         names = {number: topic.name for number, topic in self._channels.items()}
         found: dict[str, int] = {}
         for number, count in counted(self._data).items():
@@ -124,9 +125,9 @@ class McapReader:
         return found
 
     def _scan(self, data: bytes | memoryview, at: int, end: int) -> tuple[list[int], int, int]:
-        """Offsets of message records from `at` up to a chunk, the footer, a record that breaks off, or the end.
+        """Offsets of message records from `at` up to a chunk, the footer, an incomplete record, or the end.
 
-        Then the offsets of the last record that was passed, and of where it stopped.
+        Also returns the offset of the last record that was passed, and of the end of the scan.
         """
         found: list[int] = []
         last = at
@@ -137,7 +138,7 @@ class McapReader:
             if following > end or (len(found) >= _MESSAGE_BATCH and data is self._data):
                 break
             if op == MESSAGE:
-                if size >= MESSAGE_HEAD_SIZE:  # a shorter one is none
+                if size >= MESSAGE_HEAD_SIZE:  # a shorter record is no message
                     add(at)
             elif op == SCHEMA:
                 self._declare_schema(bytes(data[at + 9 : following]))
@@ -160,11 +161,11 @@ class McapReader:
         yield from by_topic(topics, channel, data, at + 31, size, log_ns)
 
     def _chunk(self, at: int, end: int, wanted: Wanted, whole: bool) -> Iterator[Block]:
-        """Messages of the chunk whose content starts at `at`; of one that breaks off, those that are there."""
+        """Messages of the chunk whose content starts at `at`; of an incomplete chunk, those that are present."""
         try:
             size, checksum = struct.unpack_from("<QI", self._data, at + 16)
             method, content = _text(self._data, at + 28)
-            content += 8  # length of what follows
+            content += 8  # length of the following data
             plain = (
                 self._data[content:end]
                 if method == ""
@@ -175,7 +176,7 @@ class McapReader:
             if whole and checksum and zlib.crc32(plain) != checksum:
                 raise ValueError("its checksum is wrong")
         except (ValueError, struct.error) as error:
-            self._declare_from_summary()  # the chunk may have been the one that did
+            self._declare_from_summary()  # the skipped chunk may have declared it
             held = ", ".join(
                 f"{count} of {self._channels[number].name}" if number in self._channels else f"{count} others"
                 for number, count in (messages_in_chunk(self._data, end) if whole else {}).items()
@@ -191,9 +192,9 @@ class McapReader:
         yield from self._split(plain, found, wanted)
 
     def _declare_from_summary(self) -> None:
-        """Declare the topics that the summary at the end of the file repeats, where there is one."""
+        """Declare the topics that the summary at the end of the file repeats, if there is one."""
         if at := summary_start(self._data):
-            with suppress(struct.error):  # it may be damaged, too
+            with suppress(struct.error):  # the summary may be damaged, too
                 self._scan(self._data, at, len(self._data) - len(MAGIC) - FOOTER_SIZE)
 
     def _declare_schema(self, body: bytes) -> None:
@@ -219,6 +220,6 @@ class McapReader:
 
 
 def _text(data: bytes | memoryview, at: int) -> tuple[str, int]:
-    """A length-prefixed string at `at`, and where it ends."""
+    """A length-prefixed string at `at`, and the position of its end."""
     (size,) = struct.unpack_from("<I", data, at)
     return bytes(data[at + 4 : at + 4 + size]).decode("utf-8", "replace"), at + 4 + size

@@ -1,7 +1,7 @@
 """MCAP files written by whole arrays of messages (format: https://mcap.dev/spec).
 
-`McapWriter` is a storage plugin of rosbags' Writer, which cares for metadata.yaml; it adds `write_arrays`
-and `flush`, which leaves everything written so far readable even if the process is killed.
+`McapWriter` is a storage plugin of rosbags' Writer, which writes metadata.yaml. It adds `write_arrays`, and
+`flush`, after which all data written so far is readable even if the process is killed.
 """
 
 import struct
@@ -66,11 +66,11 @@ class McapWriter:
         self._method = "zstd" if compression == CompressionMode.STORAGE else ""
         self._schemas: dict[str, int] = {}
         self._declared: list[bytes] = []  # schema and channel records, which the summary repeats
-        self._undeclared = bytearray()  # those that wait for the next chunk
+        self._undeclared = bytearray()  # declarations to be written with the next chunk
         self._counts: dict[int, int] = {}
         self._chunk_index: list[bytes] = []
         self._first_ns, self._last_ns = 2**63 - 1, 0
-        self._single = bytearray()  # message records that wait for the next chunk
+        self._single = bytearray()  # message records to be written with the next chunk
         self._single_rows: list[tuple[int, int, int]] = []  # their log times, channels and offsets
         self._write(MAGIC + record(HEADER, text("ros2"), text("rhythmid")))
         self._file.flush()
@@ -160,7 +160,7 @@ class McapWriter:
             self._single_rows.clear()
 
     def flush(self) -> None:
-        """Hand everything written so far to the operating system."""
+        """Pass all data written so far to the operating system."""
         self.close_chunk()
         self._file.flush()
 
@@ -201,10 +201,10 @@ class McapWriter:
         self._first_ns, self._last_ns = min(self._first_ns, span[0]), max(self._last_ns, span[1])
 
     def close(self, version: int, metadata: str) -> None:
-        """Write what is pending, the metadata and the summary, and close the file."""
+        """Write pending data, metadata and summary, and close the file."""
         del version
         self.close_chunk()
-        self._write(self._undeclared)  # topics that never carried a message
+        self._write(self._undeclared)  # topics without messages
         entry = text("serialized_metadata") + text(metadata)
         at = self._file.tell()
         written = self._write(record(METADATA, text("rosbag2"), struct.pack("<I", len(entry)), entry))
@@ -242,5 +242,5 @@ class McapWriter:
         self._file.close()
 
     def abort(self) -> None:
-        """Close the file as it is, without summary."""
+        """Close the file in its current state, without summary."""
         self._file.close()

@@ -13,12 +13,13 @@ MEASURED = re.compile(r"([+−-]?[\d.,]+(?:e[+-]?\d+)?)\s*([^\d\s.,+-].*)", re.I
 
 
 def is_measured(cell: str, decimal: str) -> bool:
-    """Whether a cell holds a number and behind it a unit that is known."""
+    """Whether a cell holds a number followed by a known unit."""
     return _parts(cell, decimal) is not None
 
 
 def measured(cells: Sequence[str], decimal: str) -> tuple[NDArray[np.float64], str] | None:
-    """Numbers (n,) of cells that all have one unit, and the unit; None where they do not. A cell without a number is NaN."""
+    """Numbers (n,) of cells with one common unit, and the unit; None where the units differ. A cell without a
+    number gives NaN."""
     found = [(np.nan, "") if is_missing(cell) else _parts(cell, decimal) for cell in cells]
     units = {one[1] for one in found if one is not None} - {""}
     if None in found or len(units) != 1:

@@ -1,4 +1,4 @@
-"""Message types: those that a bag defines itself, else those of ROS 2 Jazzy."""
+"""Message types: those defined in the bag itself, else those of ROS 2 Jazzy."""
 
 from functools import lru_cache
 from typing import Any
@@ -10,12 +10,13 @@ from rhythmid.errors import InputError
 from rhythmid.record.block import Topic
 from rhythmid.record.field import TypeFields
 
-STANDARD_DISTRO = "jazzy"  # the ROS distribution whose types are the standard ones
+STANDARD_DISTRO = "jazzy"  # ROS distribution of the standard types
 TIME_PARTS = (("sec", "int32"), ("nanosec", "uint32"))
-LENGTH_WORD = 4  # bytes in front of a string or list
+LENGTH_WORD = 4  # bytes before a string or list
 LEAST_TEXT = LENGTH_WORD + 1  # with the closing zero
-LARGEST_FIXED = 1 << 28  # bytes that a type may need at least; a message that large is not sent
-MOST_FIXED_PARTS = 10_000  # strings or messages in a fixed array: each becomes lines of code of its own
+LARGEST_FIXED = 1 << 28  # largest fixed size [bytes] of a type; larger messages are not sent
+# largest number of strings or messages in a fixed array: each becomes lines of code
+MOST_FIXED_PARTS = 10_000
 _SEPARATOR = "=" * 80 + "\n"
 
 
@@ -48,10 +49,11 @@ def type_fields(topic: Topic) -> TypeFields:
 
 
 def _check_size(types: TypeFields, name: str, sizes: dict[str, int | None]) -> int:
-    """Least size [bytes] of a message, padding left out; `sizes` collects those of its parts, None while one is being worked out.
+    """Least size [bytes] of a message, without padding. `sizes` collects those of its parts, None while one is
+    being computed.
 
-    Raises InputError for types that no message could have: that hold themselves, that need more bytes than any message, or none,
-    so that a few bytes would claim billions of them.
+    Raises InputError for impossible types: those that contain themselves, that need more bytes than any message, or
+    that need none, so that a few bytes would claim billions of them.
     """
     if name in sizes:
         if (known := sizes[name]) is None:
@@ -81,7 +83,7 @@ def _least(types: TypeFields, kind: Any, sizes: dict[str, int | None]) -> int:
 
 
 def _own_types(topic: Topic) -> dict[str, Any]:
-    """Types that the bag defines for the topic; one that cannot be parsed is as good as none."""
+    """Types that the bag defines for the topic; one that cannot be parsed counts as missing."""
     try:
         if topic.definition_format == "ros2msg":
             return get_types_from_msg(topic.definition, topic.type)
@@ -114,13 +116,13 @@ def typestore(topic: Topic) -> Any:
     store = get_typestore(Stores.EMPTY)
     try:
         store.register(dict(type_fields(topic)))
-    except (TypesysError, SyntaxError, NameError) as error:  # NameError: of a constant that is infinite
+    except (TypesysError, SyntaxError, NameError) as error:  # NameError: for an infinite constant
         raise InputError(f"{topic.name}: its type {topic.type!r} cannot be read: {error}") from None
     return store
 
 
 def stamp_path(topic: Topic) -> str | None:
-    """Path of the time stamp in the topic's messages: of its header, else its own; None if there is none."""
+    """Path of the timestamp in the topic's messages: in the header, else in the message itself; None if there is none."""
     types = type_fields(topic)
     time = (Nodetype.NAME, "builtin_interfaces/msg/Time")
     fields = dict(types[topic.type][1])
@@ -131,4 +133,4 @@ def stamp_path(topic: Topic) -> str | None:
         return None
     kinds = dict(types["builtin_interfaces/msg/Time"][1])
     whole = all(kinds.get(part) == (Nodetype.BASE, (base, 0)) for part, base in TIME_PARTS)
-    return path if whole else None  # a bag may define its own types, under the names of standard ones
+    return path if whole else None  # a bag may define its own types under standard names

@@ -26,7 +26,7 @@ class Messages:
     position, velocity, effort : float64[n] or None
         Values [m, m/s, N] of the one joint; None where the topic does not carry the field.
     receive_ns : int64[n] or None
-        When the recorder received each message [ns]; None stands for "when it was stamped".
+        Receive time of each message [ns]; None means equal to the stamp.
     """
 
     stamp_ns: NDArray[np.int64]
@@ -90,7 +90,7 @@ def string_message(value: str) -> bytes:
 def _joint_state_layout(
     joint: bytes, frame_id: bytes, present: tuple[str, ...]
 ) -> tuple[np.dtype, NDArray[np.uint8]]:
-    """Where the numbers of such a JointState stand, and the bytes of one whose numbers are all zero."""
+    """Positions of the numbers in such a JointState, and the bytes of one whose numbers are all zero."""
     body = bytearray()
     at: dict[str, tuple[str, int]] = {"sec": ("<i4", 4), "nanosec": ("<u4", 8)}
 

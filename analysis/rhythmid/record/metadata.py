@@ -1,4 +1,4 @@
-"""metadata.yaml of rosbag2, version 9: what is in a bag, file by file and topic by topic."""
+"""metadata.yaml of rosbag2, version 9: content of a bag, by file and by topic."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,12 +9,13 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2, Qos
 from rosbags.rosbag2.metadata import dump_qos_v9
 
 VERSION = 9
-_NOTHING_YET = 2**63 - 1  # starting time of what holds no message, as rosbag2 writes it
+_NOTHING_YET = 2**63 - 1  # starting time of an empty file, as rosbag2 writes it
 
 
 @dataclass
 class FileContent:
-    """What has been written to one storage file: messages by connection, and the range of their receive times [ns]."""
+    """Content written to one storage file: number of messages by connection, and the range of their receive times
+    [ns]."""
 
     name: str
     counts: dict[int, int] = field(default_factory=dict)
@@ -23,7 +24,7 @@ class FileContent:
     size: int = 0  # bytes of the messages
 
     def add(self, connection: int, first_ns: int, last_ns: int, count: int, size: int) -> None:
-        """Take note of `count` messages."""
+        """Count `count` further messages."""
         self.counts[connection] = self.counts.get(connection, 0) + count
         self.first_ns, self.last_ns = min(self.first_ns, first_ns), max(self.last_ns, last_ns)
         self.size += size
@@ -38,7 +39,7 @@ class FileContent:
 
 
 def qos_text(profiles: Sequence[Qos]) -> str:
-    """Offered quality of service as a storage file keeps it."""
+    """Offered quality of service in the form of a storage file."""
     return yaml.safe_dump(dump_qos_v9(list(profiles)), sort_keys=False).strip()
 
 
@@ -49,7 +50,7 @@ def bag_information(
     ros_distro: str,
     custom_data: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
-    """Content of metadata.yaml below its one key; `ros_distro` is the ROS distribution whose types the messages have."""
+    """Content of metadata.yaml below its top-level key; `ros_distro` is the ROS distribution of the message types."""
     total = FileContent("")
     for file in files:
         for number, count in file.counts.items():

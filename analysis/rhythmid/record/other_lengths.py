@@ -1,4 +1,4 @@
-"""Arrays of a file that have no value for each of its times: they are left out, and a user is told which and why."""
+"""Arrays of a file that do not have one value per time: they are left out and reported with the reason."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,13 +15,14 @@ from rhythmid.record.signals import Signals
 from rhythmid.record.table import HDF5, WIDEST, Table, table_suffix
 
 OF_ARRAYS = (".mat", ".npz", *HDF5, *JSON)  # kinds of tables whose columns may differ in length
-LEAST_VALUES_OF_RECORDING = 40  # values of an array that may be a recording, not a set of parameters
-NAMED = 8  # arrays that a note names
+# least number of values of an array that may be a recording rather than parameters
+LEAST_VALUES_OF_RECORDING = 40
+NAMED = 8  # largest number of arrays that a note names
 
 
 @dataclass(frozen=True)
 class Unequal:
-    """An array with its shape, and why it is no column beside the times."""
+    """An array with its shape, and the reason why it is no column for the times."""
 
     name: str
     shape: tuple[int, ...]
@@ -32,7 +33,7 @@ class Unequal:
 
 
 def unequal_arrays(table: Table, rows: int) -> Iterator[Unequal]:
-    """Arrays of numbers that do not have one value, or one row of a few values, for each of the `rows` times."""
+    """Arrays of numbers without exactly one value, or one row of a few values, per time of the `rows` times."""
     for name, values in table.columns.items():
         array = np.asarray(values)
         if array.dtype.kind in "fiubc" and array.size > 1 and (why := _why(array, rows)):
@@ -40,7 +41,7 @@ def unequal_arrays(table: Table, rows: int) -> Iterator[Unequal]:
 
 
 def _why(array: NDArray[Any], rows: int) -> str:
-    """Why an array is no column beside `rows` times; empty where it is one."""
+    """Reason why an array is no column for `rows` times; empty where it is one."""
     shape = " x ".join(map(str, array.shape))
     if array.dtype.kind == "c":
         return "holds complex numbers"
@@ -56,7 +57,7 @@ def _why(array: NDArray[Any], rows: int) -> str:
 
 
 def length_notes(table: Table, rows: int) -> tuple[str, ...]:
-    """One line on all such arrays that may be recordings; none where there are none."""
+    """One line on all such arrays that may be recordings; empty where there are none."""
     found = [str(one) for one in unequal_arrays(table, rows) if max(one.shape) >= LEAST_VALUES_OF_RECORDING]
     if not found:
         return ()
@@ -68,7 +69,7 @@ def length_notes(table: Table, rows: int) -> tuple[str, ...]:
 
 
 def read_length_notes(source: Path, signals: Signals) -> list[str]:
-    """The same of the tables that a signals.yaml names, or of the table `source` whose columns it names."""
+    """Length notes for the tables that a signals.yaml names, or for the table `source` whose columns it names."""
     files = {channel.file or source for channel in signals.channels.values()}
     found: list[str] = []
     for file in sorted(one for one in files if table_suffix(one) in OF_ARRAYS):

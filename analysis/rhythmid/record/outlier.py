@@ -1,5 +1,8 @@
-"""Samples that do not say where the machine was: outliers, which a smooth signal cannot have taken, such as a bit that fell
-over or a lost echo, and repeats, where a sensor is read more often than it measures or has stood still for a while."""
+"""Samples that do not show the machine's position: outliers and repeats.
+
+An outlier is a value that a smooth signal cannot have taken, such as a flipped bit or a lost echo. Repeats come
+from a sensor that is read more often than it measures, or that was stuck for a while.
+"""
 
 from collections.abc import Sequence
 
@@ -10,28 +13,31 @@ from scipy.ndimage import median_filter
 from rhythmid.record.quality import clipped_samples
 from rhythmid.record.rounding import resolution, resolutions
 
-WIDEST = 3  # samples in a row that may be outliers
-FAR_OFF = 12.0  # times the usual unevenness, from which a sample is suspected
-# of its distance, that the slopes before and after may differ from the line past an outlier
+WIDEST = 3  # largest number of consecutive outliers
+FAR_OFF = 12.0  # ratio to the usual roughness above which a sample is suspected
+# largest deviation of the slopes before and after from the line across an outlier, as a share of its distance
 PASSING = 0.25
-SAMPLES_OF_UNEVENNESS = 101  # samples over which the usual unevenness is taken
-LARGEST_SHARE = 0.02  # share of a signal beyond which such samples are no exception and belong to it
-USUAL = 1.4826  # standard deviations in a median absolute deviation
-LEAP = 1.5  # times the steps before and after, that the step out of repeats is at least: the motion went on meanwhile
-OFTEN = 0.3  # share of repeats, from which a sensor may be read more often than it measures
-FRESH = 2.5  # new values in a row between repeats, at most, where it is: two at a rate half as high again as its own
-EVEN = 0.8  # share of runs of repeats that are of one length, within one, where it is
-COUNTS = 3.0  # steps of the resolution that the usual change spans at least, where it is: a rounded value that creeps on changes by one
+SAMPLES_OF_UNEVENNESS = 101  # samples over which the usual roughness is measured
+LARGEST_SHARE = 0.02  # share of a signal above which such samples are not exceptional and are part of it
+USUAL = 1.4826  # ratio of standard deviation to median absolute deviation
+# least ratio of the step after repeats to the steps before and after: the motion went on meanwhile
+LEAP = 1.5
+OFTEN = 0.3  # share of repeats above which a sensor may be read more often than it measures
+# most consecutive new values between repeats for such a sensor: two if it is read at one and a half times its rate
+FRESH = 2.5
+EVEN = 0.8  # least share of runs of repeats with one length, within one sample, for such a sensor
+# least usual change in steps of the resolution for such a sensor: a slowly changing rounded value changes by one
+COUNTS = 3.0
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
 def outlying_samples(value: Array) -> Mask:
-    """Whether samples (n,) stand far off the line that the samples before and after them make, at most three in a row; of the two
-    good ones on either side, the outer one may be missing at an end.
+    """Whether samples (n,) are far from the line through the samples before and after them, for at most three in a row.
 
-    A kink in the signal, such as an impact makes, changes the slope and is none; nor is what happens too often.
+    Two good samples are needed on either side; at an end of the record the outer one may be missing. A kink in the
+    signal, such as an impact, changes the slope and is no outlier. Values that occur too often are none, either.
     """
     found = np.zeros(len(value), dtype=bool)
     if len(value) < SAMPLES_OF_UNEVENNESS:
@@ -55,12 +61,14 @@ def outlying_samples(value: Array) -> Mask:
 
 
 def repeated_samples(value: Array) -> Mask:
-    """Whether samples (n,) repeat the one before though the motion went on.
+    """Whether samples (n,) repeat the one before although the motion continued.
 
-    It did where the sensor is read more often than it measures, so that repeats come in even runs, and where they are an exception
-    with a leap after them. A machine that sticks repeats values, too, but starts from rest, and one that does so often sticks and
-    slips; where values are rounded, repeats say nothing unless what comes between them are leaps of many counts; and what is clipped
-    is another matter. A sensor that is read too often measures a machine at rest again and again: of a longer run the samples are kept
+    There are two cases. A sensor that is read more often than it measures gives even runs of repeats. Otherwise
+    repeats are an exception with a leap after them. Three other causes are excluded. A machine that sticks also
+    repeats values, but starts from rest; frequent repeats of that kind are stick-slip. With rounded values, repeats
+    count only if the changes between them are leaps of many steps. Clipped samples are handled separately. A sensor
+    that is read too often measures a machine at rest repeatedly: of a longer run, the samples at its own
+    measurement times are kept.
     at which it did.
     """
     found = np.zeros(len(value), dtype=bool)
@@ -68,7 +76,7 @@ def repeated_samples(value: Array) -> Mask:
     if len(value) < SAMPLES_OF_UNEVENNESS or not np.any(step == 0.0) or not np.any(step != 0.0):
         return found
     edges = np.diff(np.concatenate([[False], step == 0.0, [False]]).astype(int))
-    # of steps of zero
+    # for zero steps
     runs = list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
     lengths = np.array([end - begin for begin, end in runs])
     count = resolution(value)
@@ -84,24 +92,25 @@ def repeated_samples(value: Array) -> Mask:
 
 
 def _read_often(step: Array, lengths: NDArray[np.int64], count: float) -> bool:
-    """Whether steps (n,) with runs of zeros of these lengths are those of a sensor that is read more often than it measures, in `count`s
-    of its resolution (0: none)."""
+    """Whether steps (n,), with runs of zeros of these lengths, come from a sensor that is read more often than it
+    measures. `count` is its resolution (0: none)."""
     share = lengths.sum() / len(step)
-    fresh = (len(step) - lengths.sum()) / len(lengths)  # values in a row that are new
+    fresh = (len(step) - lengths.sum()) / len(lengths)  # consecutive new values
     regular = np.mean(np.abs(lengths - np.median(lengths)) <= 1) > EVEN
     usual = float(np.median(np.abs(step[step != 0.0])))
     return bool(share > OFTEN and fresh < FRESH and regular and usual >= COUNTS * count)
 
 
 def _measured_again(runs: Sequence[tuple[int, int]], every: int) -> list[int]:
-    """Samples within runs of repeats at which a sensor that measures `every` so many samples has found the same once more."""
+    """Samples within runs of repeats at which a sensor that measures every `every` samples has measured the same
+    value again."""
     return [
         begin + number * every for begin, end in runs for number in range(1, round((end + 1 - begin) / every))
     ]
 
 
 def _leaps(step: Array, begin: int, end: int) -> bool:
-    """Whether the step `end` after steps of zero from `begin` on is larger than the one before them and the one after it."""
+    """Whether the step `end`, after zero steps from `begin` on, is larger than the steps before and after them."""
     if begin == 0 or end + 1 >= len(step):
         return False
     return abs(step[end]) > LEAP * max(abs(step[begin - 1]), abs(step[end + 1]))

@@ -1,4 +1,5 @@
-"""Channels that are the output once more: one sensor in volts and in millimetres, or what a controller that holds its place makes of it."""
+"""Channels that are copies of the output: the same sensor in volts and millimetres, or the effort of a controller
+that holds a position."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,15 +7,16 @@ from numpy.typing import NDArray
 from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
-SAME = 0.999  # correlation at once from which a channel may be the output in another unit
-SAME_STEPS = 0.99  # the same of their steps: what merely goes along has noise of its own
+SAME = 0.999  # correlation without lag above which a channel may be the output in another unit
+SAME_STEPS = 0.99  # the same for their steps: a merely correlated channel has its own noise
 
 
 def correlation_of_copy(one: Array, output: Array, steps: tuple[float, float]) -> float:
-    """Correlation of a channel with the output (n,) at the same times where it is an affine copy of it, noise and all; else 0.
+    """Correlation of a channel with the output (n,) at the same times where it is an affine copy, including noise;
+    else 0.
 
-    `steps` are what the two are rounded to. Rounding spoils the steps of a copy; then it is one where the two differ by no more than
-    that.
+    `steps` are the rounding steps of the two. Rounding lowers the correlation of the steps of a copy. Then it
+    counts as a copy where the two differ by no more than the rounding.
     """
     if len(one) < 3:
         return 0.0
@@ -30,13 +32,13 @@ def correlation_of_copy(one: Array, output: Array, steps: tuple[float, float]) -
 
 
 def smallest_step(value: Array) -> float:
-    """What values are rounded to, if they are: the smallest difference between two of them."""
+    """Rounding step of values, if they are rounded: the smallest difference between two of them."""
     steps = np.diff(np.unique(value[np.isfinite(value)]))
     return float(steps.min()) if len(steps) else 0.0
 
 
 def doubt_of_copy(correlation: float) -> str:
-    """What is doubtful about a copy that is said to drive."""
+    """Message about a copy of the output that is declared as a driving channel."""
     return (
         f"it is a copy of the output (correlation {correlation:+.5f} at once): what a controller makes while its reference "
         "stands still, or the same motion in another unit"
@@ -44,7 +46,8 @@ def doubt_of_copy(correlation: float) -> str:
 
 
 def copy_notes(record: Record) -> list[str]:
-    """A line on each effort that is the output times a negative number: a spring that the machine has would need a positive one."""
+    """A line on each effort that is the output times a negative number: a spring of the machine would need a
+    positive one."""
     found: list[str] = []
     for role, channel in (("input", record.input), ("effort", record.effort)):
         if channel is None or (role == "input" and record.input_kind != "force"):
@@ -58,7 +61,7 @@ def copy_notes(record: Record) -> list[str]:
 
 
 def _at_once(one: Channel, output: Channel) -> tuple[Array, Array, tuple[float, float]]:
-    """Both at the output's times that the other channel covers, and what they are rounded to."""
+    """Both channels at the output's times within the other channel's range, and their rounding steps."""
     told, there = np.isfinite(one.value), np.isfinite(output.value)
     steps = smallest_step(one.value), smallest_step(output.value)
     if not told.any():

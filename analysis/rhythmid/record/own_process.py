@@ -1,4 +1,4 @@
-"""Arrays read in a process of its own, for readers in machine code that trust their file: a damaged one may kill the process."""
+"""Reads arrays in a separate process, for compiled readers that trust their file: a damaged file may kill the process."""
 
 import faulthandler
 import os
@@ -13,20 +13,20 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 
 Arrays = Mapping[str, NDArray[Any]]
-FAILED = 3  # exit code: the reader refused the file
+FAILED = 3  # exit code: the reader rejected the file
 
 
 def arrays_in_own_process(read: Callable[[], Arrays], problem: str) -> Arrays:
-    """What `read` returns, called in a fork of this process; arrays of objects come back as empty arrays of text.
+    """Result of `read`, called in a fork of this process; arrays of objects are returned as empty arrays of text.
 
-    Nothing but numbers and texts comes back, in NumPy's own format without pickles, so that the reader cannot be made to hand over
-    anything else. Raises InputError, beginning with `problem`, where it raises or the process dies. Where the system cannot fork,
-    `read` is called here.
+    Only numbers and texts are returned, in NumPy's own format without pickles, so that the reader cannot pass on
+    anything else. Raises InputError, beginning with `problem`, where the reader raises or the process dies. Where
+    the system cannot fork, `read` is called in this process.
     """
     if not hasattr(os, "fork"):
         return read()
     with TemporaryFile() as file:
-        child = os.fork()  # not multiprocessing's: its workers may have none of their own
+        child = os.fork()  # not multiprocessing: its workers may have no child processes
         if child == 0:
             code = 1
             try:
@@ -45,15 +45,15 @@ def arrays_in_own_process(read: Callable[[], Arrays], problem: str) -> Arrays:
 
 
 def _write(read: Callable[[], Arrays], file: IO[bytes]) -> int:
-    """Write what `read` returns, or why it fails; the exit code says which."""
+    """Write the result of `read`, or the reason why it fails; the exit code says which."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    faulthandler.disable()  # the parent tells of it, in one line
+    faulthandler.disable()  # the parent reports the failure in one line
     try:
         found = read()
         arrays = (np.empty(0, dtype=str) if array.dtype.hasobject else array for array in found.values())
         np.savez(file, np.array(list(found), dtype=str), *arrays)
         file.flush()
-    except Exception as error:  # the reader of damaged files raises anything
+    except Exception as error:  # the reader may raise any exception on a damaged file
         file.seek(0)
         file.truncate()
         file.write(" ".join(str(error).split()).encode())

@@ -1,23 +1,24 @@
-"""How punctual the graph was that made a recording, by its topic `run`, and what of it matters for the analysis."""
+"""Punctuality of the ROS graph during a recording, from its topic `run`, as far as it matters for the analysis."""
 
 from collections.abc import Mapping
 from typing import Any
 
-# share of late messages, from which they are told: the 99th percentile of the lateness then exceeds a sample period
+# share of late messages above which they are reported: the 99th percentile of the lateness then exceeds a sample period
 NOTABLE = 0.01
-# stages that messages pass; where the command path holds them back until they are due, a late sender does not matter
+# stages that messages pass; where the command path holds messages until they are due, a late sender does not matter
 _PATHS = {"commands": ("command_delay", "plant"), "measurements": ("measurement_delay",)}
 _SENDER = "excitation"
 _MEND = "use lockstep or a quieter machine"
 
 
 def punctuality_notes(run: Mapping[str, Any] | None) -> tuple[str, ...]:
-    """What deserves mention, one line each; empty for a punctual run and for a recording that says nothing of it.
+    """Messages about punctuality, one line each; empty for a punctual run and for a recording without timing data.
 
     Parameters
     ----------
-    run : what the topic `run` says. `timing` has for each stage of the path that worked in real time how many messages
-        (`of`) came more than a sample period `late`, and the longest delay of one [s] (`max`); and how many were `lost`.
+    run : content of the topic `run`. `timing` has for each real-time stage of the path how many of its messages
+        (`of`) were more than a sample period `late`, the longest delay of one [s] (`max`), and how many were
+        `lost`.
     """
     timing = (run or {}).get("timing")
     if not isinstance(timing, Mapping):
@@ -39,6 +40,6 @@ def punctuality_notes(run: Mapping[str, Any] | None) -> tuple[str, ...]:
 
 
 def _number(values: Mapping[str, Any], name: str) -> float:
-    """A number of a foreign document; 0 for what is none."""
+    """A number from an external document; 0 where it is no number."""
     value = values.get(name)
     return float(value) if isinstance(value, (int, float)) else 0.0

@@ -1,4 +1,4 @@
-"""Data quality of a record: what a user should know before trusting what was identified from it."""
+"""Data quality of a record: properties that affect the reliability of results identified from it."""
 
 import math
 from collections.abc import Mapping
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from rhythmid.record.rounding import resolution
 from rhythmid.record.timing import Timing
 
-# of the usual step (rms), from which the steps beside a plateau are those of a machine that goes on: a sine that is cut off at
-# 99 % of its size has 0.2 there, one that comes to rest has none
+# least size (rms) of the steps beside a plateau, relative to the usual step, for a motion that continues: a sine
+# clipped at 99 % of its size has 0.2 there, one that comes to rest has none
 MOVING = 0.05
-CLIPPED_RUN = 4  # samples in a row at the extreme value
-CLIPPED_EXCESS = 5  # times as many samples in such runs as at the next value
+CLIPPED_RUN = 4  # consecutive samples at the extreme value
+CLIPPED_EXCESS = 5  # ratio of samples in such runs to samples at the next value
 
 
 @dataclass(frozen=True)
@@ -24,20 +24,20 @@ class ChannelQuality:
 
     Attributes
     ----------
-    source : where it comes from.
+    source : origin of the channel.
     timing : of its samples, as recorded.
-    nan : samples that are no number (NaN, or an empty field of a table) and count as missing.
-    clipped : samples in runs at the largest or smallest value, as a limit leaves them.
-    missing : messages that do not carry the channel's entry, such as those of another joint.
-    conflicts : duplicates whose values differ.
-    lateness_mean, lateness_max, lateness_min, lateness_std : receive time minus header stamp [s], the last its jitter; None
-        where there is none.
-    skew, skew_std : by how much faster the clock of its stamps runs than that of receipt [s/s], and the standard deviation of that;
-        None where it cannot be seen. See `clock_skew`.
-    stamp_jitter, stamp_jitter_std : standard deviation of the jitter of the stamps that the samples themselves show [s], and how well
-        that is known [s] (a standard deviation); None where they show none. See `stamp_jitter`.
-    resolution : step of the grid that its values are rounded to, the coarsest where it depends on their size, in its unit; 0 where they
-        show none.
+    nan : samples that are not a number (NaN, or an empty field of a table) and count as missing.
+    clipped : samples in runs at the largest or smallest value, as caused by a limit.
+    missing : messages without the channel's entry, such as those of another joint.
+    conflicts : duplicates with different values.
+    lateness_mean, lateness_max, lateness_min, lateness_std : receive time minus header stamp [s], the last its
+        jitter; None without header stamps.
+    skew, skew_std : rate by which the stamping clock runs faster than the receiver's clock [s/s], and its standard
+        deviation; None where it is not observable. See `clock_skew`.
+    stamp_jitter, stamp_jitter_std : standard deviation of the stamp jitter estimated from the samples [s], and its
+        uncertainty [s] (a standard deviation); None where none is detected. See `stamp_jitter`.
+    resolution : rounding step of its values in its unit, the coarsest where it depends on their size; 0 where none is
+        detected.
     """
 
     source: str
@@ -57,12 +57,13 @@ class ChannelQuality:
     resolution: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON, the timing's among them."""
+        """Plain numbers for JSON, including the timing."""
         values = asdict(self)
         return {"source": values.pop("source"), "rate": self.timing.rate, **values.pop("timing"), **values}
 
     def facts(self) -> list[str]:
-        """Rate, jitter of its times (of irregular ones their usual steps) and of its arrival, and rounding, one phrase each."""
+        """Rate, jitter of its times (for irregular ones their usual steps) and of its arrival, and rounding, one
+        phrase each."""
         timing = self.timing
         found = [timing.told_rate] if timing.rate > 0.0 else []
         if timing.jitter_std > 0.0 and timing.usual_range is None:
@@ -76,7 +77,7 @@ class ChannelQuality:
         return found
 
     def complaints(self) -> list[str]:
-        """What deserves mention, one phrase each; empty for a flawless channel."""
+        """Defects of the channel, one phrase each; empty for a flawless channel."""
         timing = self.timing
         found = {
             f"{timing.gaps} gaps, {timing.lost} samples lost, longest {timing.longest_gap:.4g} s": timing.gaps,
@@ -89,7 +90,7 @@ class ChannelQuality:
         return [phrase for phrase, count in found.items() if count]
 
     def matters(self) -> list[str]:
-        """Those of the complaints by which an answer may change: not messages without the entry, equal duplicates, and what was put in order."""
+        """The complaints that may change a result: without missing entries, equal duplicates and reordered messages."""
         harmless = replace(self, missing=0, timing=replace(self.timing, late=0))
         if not self.conflicts:
             harmless = replace(harmless, timing=replace(harmless.timing, duplicates=0))
@@ -98,9 +99,9 @@ class ChannelQuality:
 
 @dataclass(frozen=True)
 class Quality:
-    """Quality of a record, channel by channel; `truncated` if the recording breaks off; `notes` one line each.
+    """Quality of a record, channel by channel; `truncated` if the recording is incomplete; `notes` one line each.
 
-    `assumed` are those of the notes that tell what the signals.yaml takes for granted, and no fault of the recording.
+    `assumed` are the notes about assumptions of the signals.yaml rather than faults of the recording.
     """
 
     channels: Mapping[str, ChannelQuality]
@@ -153,7 +154,7 @@ class Quality:
         }
 
     def warnings(self) -> list[str]:
-        """What deserves mention, one line each."""
+        """Defects of all channels, one line each."""
         return [
             *self.notes,
             *(
@@ -170,11 +171,12 @@ def clipped(value: NDArray[np.float64]) -> int:
 
 
 def clipped_samples(value: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether samples lie in runs of at least 4 at the largest or smallest value, as a limit leaves them.
+    """Whether samples lie in runs of at least 4 at the largest or smallest value, as caused by a limit.
 
-    Coarse rounding and plateaus also make such runs; it is clipping only if the next value inwards is far rarer than
-    the extreme one, for a signal that passes through has no reason to be. Signals of few levels have no such next value. A machine that comes
-    to rest elsewhere as often and for as long may rest at its extremes, too.
+    Coarse rounding and plateaus also cause such runs. Clipping is reported only if the next value inwards is far
+    rarer than the extreme one, because a signal that passes through has no reason to be. Signals with few levels
+    have no such next value. A machine that comes to rest at other positions as often and for as long may rest at
+    its extremes, too.
     """
     if len(value) < CLIPPED_RUN:
         return np.zeros(len(value), dtype=bool)
@@ -205,8 +207,8 @@ def _at_limit(value: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _rests(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
-    """Whether a signal (n,) keeps values between its extremes as often as in these runs and about as long; before its first move and after its
-    last one any signal does."""
+    """Whether a signal (n,) keeps values between its extremes as often as in these runs and for about as long.
+    Values before its first and after its last move are ignored, because any signal rests there."""
     changes = np.flatnonzero(np.diff(value)) + 1
     lengths, level = np.diff(changes), value[changes[:-1]]
     about = 0.5 * float(np.median([end - begin for begin, end in runs]))
@@ -215,8 +217,8 @@ def _rests(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
 
 
 def _moving(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
-    """Whether a signal (n,) both enters and leaves its plateaus at speed, as one does that a sensor cuts off; a machine that comes
-    to rest by friction slows down, and one that hits a stop starts from rest."""
+    """Whether a signal (n,) both enters and leaves its plateaus at speed, as a clipped signal does. A machine that
+    comes to rest by friction slows down, and one that hits a stop starts from rest."""
     step = np.abs(np.diff(value))
     moves = step[step > 0.0]
     if len(moves) == 0:
@@ -224,7 +226,7 @@ def _moving(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
     usual = float(np.sqrt(np.mean(moves**2)))
     entries = [
         step[begin - 2] for begin, _ in runs if begin >= 2
-    ]  # outside the step that the limit itself cuts
+    ]  # without the step that the limit itself shortens
     exits = [step[end] for _, end in runs if end < len(step)]
-    least = max(MOVING * usual, 1.5 * resolution(value))  # a step of a rounded value may be that of a creep
+    least = max(MOVING * usual, 1.5 * resolution(value))  # a step of a rounded value may be a slow drift
     return all(ends and float(np.median(ends)) > least for ends in (entries, exits))

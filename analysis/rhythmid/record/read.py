@@ -1,4 +1,4 @@
-"""Records read: from bags and from tables, by what signals.yaml says the channels are."""
+"""Reads records from bags and tables, with the channels mapped by signals.yaml."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -30,17 +30,17 @@ from rhythmid.record.time_origin import CALENDAR, counted_from, origin_of
 from rhythmid.record.timing import put_in_order
 from rhythmid.record.unit_notes import unit_notes
 
-MOSTLY = 0.5  # share of samples that are no number, beyond which a channel is useless
-LARGEST = 1e100  # of a measured value: its square is still a number
-AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
+MOSTLY = 0.5  # share of samples that are not numbers above which a channel is unusable
+LARGEST = 1e100  # largest measured value: its square is still finite
+AMBIGUOUS = 0.01  # share of samples that may have the same time as another one with a different value
 SPLIT = "sort the table, or take it apart with  rhythmid split"
-SAMPLES_PER_CYCLE = 100  # of a forcing that is given by formula
+SAMPLES_PER_CYCLE = 100  # of a forcing that is given by a formula
 MOST_OF_FORMULA = 50_000_000  # samples of it, 400 MB: an hour at 100 Hz has 36 million
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of one channel as recorded: time [s] and value in the order of recording, and how late they came [s]."""
+    """Samples of one channel as recorded: time [s] and value in the order of recording, and latency [s]."""
 
     source: Source
     time: NDArray[np.float64]
@@ -52,7 +52,7 @@ class Samples:
 def load_records(
     paths: Iterable[str | Path], signals: Signals | str | Path | None = None, tell: Tell = silent
 ) -> list[Record]:
-    """Read several records, telling how far it has come; see `read_record`."""
+    """Read several records, with progress messages; see `read_record`."""
     if isinstance(signals, (str, Path)):
         signals = Signals.load(signals)
     given = list(paths)
@@ -64,15 +64,14 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
 
     Parameters
     ----------
-    source : a bag directory, an .mcap or .db3 file, a signals.yaml that names tables, or a table, of which `signals` names
-        the columns.
-    signals : which channel is what; by default the topics of rhythmid's own nodes.
+    source : a bag directory, an .mcap or .db3 file, a signals.yaml that names tables, or a table, of which
+        `signals` names the columns.
+    signals : mapping of the channels; by default the topics of rhythmid's own nodes.
 
-    Times are relative to the first sample of any channel; a clock that began with the run (simulated time) and the
-    time column of a table, unless it counts from 1970, keep their own zero. Messages that overtook one another are put back in order, duplicates
-    are dropped, and both are counted in the record's quality.
-
-    A sample that is no number (NaN, an empty field of a table) is a missing one, and counted.
+    Times are relative to the first sample of any channel. A clock that started with the run (simulated time) keeps
+    its own zero, as does the time column of a table, unless it counts from 1970. Messages out of order are sorted
+    and duplicates dropped; both are counted in the record's quality. NaN and empty fields of a table count as
+    missing.
 
     Raises InputError, one line, when there is no such recording, a topic or field is missing or empty, a used sample is
     infinite, time goes backwards, or too little is recorded.
@@ -87,7 +86,7 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
         return read_tables(given)
     try:
         there = source.exists()
-    except OSError as error:  # a path that no file can have
+    except OSError as error:  # an impossible path
         raise InputError(f"{source}: {error.strerror}") from None
     if not there:
         raise InputError(f"{source}: no such file or directory")
@@ -113,7 +112,7 @@ def read_bag(bag: Bag, signals: Signals | None = None) -> Record:
     columns = read_columns(_divert_run(blocks, run), wanted)
     description, notes = _description(run)
     if signals is None and chosen.channels["output"].topic not in bag.topics and description is not None:
-        # our own recordings say under which namespace and for which joint they were made
+        # rhythmid's own recordings state their namespace and joint
         named = Signals.default(str(description.get("namespace")), str(description.get("joint")))
         if named.channels["output"].topic in bag.topics:
             return read_bag(Bag(bag.path), named)
@@ -174,12 +173,12 @@ def read_tables(signals: Signals) -> Record:
     assert signals.path is not None
     name = table_name(signals.path)
     if name == "signals":
-        name = signals.path.resolve().parent.name  # tells more
+        name = signals.path.resolve().parent.name  # the folder's name is more specific
     told = (note for table in tables.values() for note in table.notes)
     quality = Quality({}, notes=(*unit_notes(signals), *told))
     clocks = {(source.file, source.clock(signals.time)) for source in signals.channels.values()}
     first = min((float(samples.time.min()) for samples in made.values() if len(samples.time)), default=0.0)
-    if first >= CALENDAR:  # what is used of it is told from its first row on
+    if first >= CALENDAR:  # the used part starts with its first row
         made = {role: replace(samples, time=samples.time - first) for role, samples in made.items()}
     record = _record(name, made, signals, SPLIT, quality)
     record = replace(record, hold=signals.hold) if signals.hold else _with_hold(record)
@@ -188,14 +187,14 @@ def read_tables(signals: Signals) -> Record:
 
 
 def _is_merged(table: Table, signals: Signals) -> bool:
-    """Whether rows of streams with stamps of their own make up a table; never one without a time."""
+    """Whether a table merges rows of streams with their own timestamps; False for one without a time."""
     clocks = [source.clock(signals.time) for source in signals.channels.values() if source.file == table.path]
     times = {str(clock.column) for clock in clocks if clock.kind == "column"}
     return bool(times) and is_merged(value for name, value in table.vectors() if name not in times)
 
 
 def is_run(topic: Topic) -> bool:
-    """Whether the topic carries descriptions of the experiment."""
+    """Whether the topic holds descriptions of the experiment."""
     return topic.type == "std_msgs/msg/String" and topic.name.rsplit("/", 1)[-1] == "run"
 
 
@@ -261,9 +260,9 @@ def _from_columns(
     return stamp_ns[kept], Samples(source, np.empty(0), value, lateness, int(missing.sum()))
 
 
-@np.errstate(over="ignore", invalid="ignore")  # of numbers near the largest, and NaN of every kind
+@np.errstate(over="ignore", invalid="ignore")  # for numbers near the largest, and NaN of every kind
 def _in_unit(value: NDArray[np.float64], source: Source) -> NDArray[np.float64]:
-    """Values (n,) in the unit of the analyses. What no machine has, as damaged bytes may, becomes infinite, and is refused with its place."""
+    """Values (n,) in SI or model units. Impossible ones, as from damaged bytes, become infinite and are rejected."""
     value = value * source.scale + source.offset
     return np.where(np.abs(value) > LARGEST, np.copysign(np.inf, value), value)
 
@@ -307,7 +306,7 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
 
 
 def _evenly(clock: str) -> str:
-    """What else mends stamps that several rows share."""
+    """A further way to correct stamps that several rows share."""
     return (
         ", or, where the rows were taken evenly, give their rate: time: {sample_rate: HZ}, of init --rate HZ"
         if clock == "column"
@@ -316,13 +315,13 @@ def _evenly(clock: str) -> str:
 
 
 def _conflicts(samples: Samples, time: NDArray[np.float64], value: NDArray[np.float64]) -> int:
-    """Number of samples whose value differs from the one that was kept for their time."""
+    """Number of samples whose value differs from the one kept for the same time."""
     kept = value[np.searchsorted(time, samples.time)]
     return int(np.count_nonzero((samples.value != kept) & np.isfinite(samples.value)))
 
 
 def _finish(record: Record, signals: Signals) -> Record:
-    """Cut to what is used, refuse what cannot be used, and add a forcing that is known by formula."""
+    """Cut to the used part, reject unusable data, and add a forcing that is given by a formula."""
     if signals.use != (-np.inf, np.inf):
         record = record.cut(*signals.use)
     for role, channel in record.channels.items():
@@ -361,7 +360,7 @@ def _finish(record: Record, signals: Signals) -> Record:
 
 
 def _require_overlap(record: Record) -> None:
-    """Refuse channels that were not recorded at the time of the output: most likely their clocks differ."""
+    """Reject channels that were not recorded at the same time as the output: most likely their clocks differ."""
     first, last = record.output.time[0], record.output.time[-1]
     least = (FEWEST_COMMON_SAMPLES - 1) * record.output.period
     for role, channel in record.channels.items():
@@ -376,7 +375,7 @@ def _require_overlap(record: Record) -> None:
 
 
 def _pumping_frequency(record: Record) -> float:
-    """Frequency of the forcing [Hz] as far as formula or description tell, else 0."""
+    """Frequency of the forcing [Hz] from the formula or the description, else 0."""
     law = record.forcing_law
     if law is None and record.run is not None:
         try:
@@ -387,8 +386,8 @@ def _pumping_frequency(record: Record) -> float:
 
 
 def _with_hold(record: Record) -> Record:
-    """A table's record with how its input continues: as steps where these are events, else as what was measured does: band-limited if evenly
-    spaced but for gaps, by straight lines if not."""
+    """A table's record with the hold of its input: steps for events; else band-limited where evenly spaced
+    apart from gaps, linear otherwise."""
     if record.input is None:
         return record
     if note := held_note(record.input, record.output):

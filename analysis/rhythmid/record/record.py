@@ -1,4 +1,4 @@
-"""Record: the channels of one recording, each with its own times, and the same on one uniform grid."""
+"""Record: the channels of one recording, each with its own times, and resampled to one uniform grid."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,9 +22,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 Array = NDArray[np.float64]
-FEWEST_COMMON_SAMPLES = 8  # samples that a record must have in common
-AS_GOOD = 3.0  # times the error of a cubic over one missing sample, up to which one over more is as good
-LEAST_STEP_IN_PERIODS = 0.1  # periods; samples that follow another sooner are left out of an interpolation
+FEWEST_COMMON_SAMPLES = 8  # least number of samples common to all channels
+# ratio to the error of a cubic across one missing sample below which a cubic across one more is acceptable
+AS_GOOD = 3.0
+LEAST_STEP_IN_PERIODS = 0.1  # in periods; samples that follow sooner are left out of an interpolation
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class Channel:
     unit
         SI unit, such as "m" or "N".
     source
-        Topic and field, or column, that the samples come from.
+        Topic and field, or column, of the samples.
 
     Examples
     --------
@@ -77,9 +78,9 @@ class Uniform:
     period, rate
         Of the grid [s, Hz].
     valid
-        Bool[n]; False where a channel has a gap that its neighbours do not tell, so that its value is no more than a bridge.
+        Bool[n]; False where a channel has a gap that cannot be interpolated reliably from its neighbours.
     missing
-        Bool[n]; True within any gap of a channel, whether its neighbours tell it or not.
+        Bool[n]; True within any gap of a channel, whether it can be interpolated or not.
     """
 
     time: Array
@@ -103,12 +104,12 @@ class Uniform:
 
 @dataclass(frozen=True, eq=False)
 class Record(Result):
-    """One recording, cut to what is used of it.
+    """One recording, cut to its used part.
 
     Attributes
     ----------
     input
-        What drives the machine; None in a free decay.
+        Signal that drives the machine; None in a free decay.
     output
         The measured motion.
     forcing, velocity, effort, reference
@@ -116,27 +117,28 @@ class Record(Result):
     start_ns
         Time of the record's zero on the recording's clock [ns].
     hold
-        How the input continues between its samples. With 'zero', a value holds from its stamp until the next one.
+        Interpolation of the input between its samples. With 'zero', a value holds from its stamp until the next one.
     input_kind
         Force, base_displacement, base_acceleration or reference (of a controller that the model holds).
     output_kind
         Position, velocity or acceleration.
     forcing_law
-        The forcing's formula, if that is how it is known; `forcing` then holds samples of it.
+        Formula of the forcing, if it is given by one; `forcing` then holds samples of it.
     run
-        The description of the experiment that the recording itself carries.
+        Description of the experiment in the recording itself.
     parameters
-        What parameters of the model, by "element.parameter", were in this record, where that is declared.
+        Declared values of the model's parameters in this record, by "element.parameter".
     whole
-        Name of the record that this one is a stretch of; empty for a whole one.
+        Name of the record of which this is a stretch; empty for a whole one.
     stamped
-        Whether the output's times are stamps, which may jitter; they are none where they follow from a declared rate.
+        Whether the output's times are measured timestamps, which may jitter; False where they follow from a
+        declared rate.
     one_clock
-        Whether all channels are columns of one table with one time, so that their clocks cannot run apart.
+        Whether all channels are columns of one table with one time, so that there is no clock drift between them.
 
     Examples
     --------
-    A record of arrays at hand; `rhythmid.load` makes one of a bag or a table.
+    A record from arrays; `rhythmid.load` reads one from a bag or a table.
 
     >>> import numpy as np
     >>> time = np.arange(0.0, 10.0, 0.01)
@@ -178,13 +180,13 @@ class Record(Result):
 
     @property
     def headline(self) -> str:
-        """Name, duration and what was measured."""
+        """Name, duration and measured quantity."""
         return (
             f"{self.name}: {self.duration:.4g} s of {self.output_kind} at {1.0 / self.output.period:.4g} Hz"
         )
 
     def tables(self) -> Mapping[str, Sequence[Row]]:
-        """`channels`: how many samples each has, at which rate, and where they come from."""
+        """`channels`: number of samples, rate and source of each."""
         return {
             "channels": [
                 {
@@ -220,7 +222,7 @@ class Record(Result):
         }
 
     def show(self, console: "Console") -> None:
-        """Print the channels and what is to be known of their quality."""
+        """Print the channels and their quality."""
         from rhythmid.report.terminal_table import print_table
 
         rows = [
@@ -242,7 +244,7 @@ class Record(Result):
         return axis
 
     def cut(self, start: float, end: float) -> "Record":
-        """The part with start <= time < end [s]; of a held input, also the value in force at the start.
+        """The part with start <= time < end [s]; for a held input including the value in force at the start.
 
         Raises InputError when fewer than 8 samples of the output, or none of another channel, are left.
         """
@@ -262,12 +264,12 @@ class Record(Result):
         return replace(self, **parts)
 
     def uniform(self, rate: float | None = None) -> Uniform:
-        """All channels on one grid that spans what they have in common.
+        """All channels on one grid over the time that they have in common.
 
         The rate [Hz] is that of the output unless given. The grid passes through the samples of the most important
-        channel that is evenly spaced. Samples that lie on the grid (within 1 ns) are copied. Elsewhere the input and
-        reference follow their hold, other channels a cubic spline; there is no low-pass filter in front of a lower
-        rate. A formula for the forcing is evaluated. Raises InputError when the channels have too little in common.
+        channel that is evenly spaced. Samples on the grid (within 1 ns) are copied. Between samples the input and
+        reference follow their hold, other channels a cubic spline. No low-pass filter is applied before a lower
+        rate. A formula for the forcing is evaluated. Raises InputError when the channels have too little time in common.
         """
         if rate is not None and not (np.isfinite(rate) and rate > 0.0):
             raise InputError(f"{self.name}: a rate of {rate} Hz is impossible")
@@ -297,7 +299,8 @@ class Record(Result):
         return Uniform(grid, values.pop("output"), period, valid, missing, **values)
 
     def _last(self, role: str, channel: Channel) -> float:
-        """Until when the channel has a value: a held one keeps its last for one more period, a lone one for ever."""
+        """Time [s] until which the channel has a value: a held one keeps its last for one more period, a single one
+        for ever."""
         return channel.time[-1] + (channel.period if _held(role, self.hold) else 0.0)
 
     def _resample(self, role: str, channel: Channel, grid: Array) -> Array:
@@ -334,12 +337,12 @@ def _on_grid(time: Array, anchor: float, period: float) -> NDArray[np.bool_]:
 
 
 def _within_gap(channel: Channel, grid: Array, held: bool) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Whether grid times lie in a gap of the channel, and in one that its neighbours do not tell.
+    """Masks of grid times within a gap of the channel, and within a gap that cannot be interpolated from its neighbours.
 
-    A time within half a period of a sample is told by it, one of a `held` value within a whole period after it, as between samples
-    that are there: so a gap is as many periods long as samples are lost, and a sample between two gaps keeps them apart wherever the
-    grid lies. The neighbours tell a gap where a cubic through them is nearly as good as the samples themselves, and where a held
-    value is the same before and after.
+    A sample is valid within half a period of its time, a `held` value for a whole period after it. So a gap is as
+    many periods long as samples are lost, and a sample between two gaps separates them wherever the grid lies. A
+    gap can be interpolated where a cubic through its neighbours is nearly as accurate as the samples themselves,
+    and where a held value is the same before and after.
     """
     missing, untold = np.zeros(len(grid), dtype=bool), np.zeros(len(grid), dtype=bool)
     first, lost = gaps_between(channel.time)

@@ -1,4 +1,4 @@
-"""Recovery of a recording whose recorder was killed: what is readable becomes a complete bag."""
+"""Recovery of a recording whose recorder was killed: readable messages are written to a complete bag."""
 
 import time
 from collections.abc import Mapping
@@ -22,9 +22,9 @@ from rhythmid.record.message_types import typestore
 
 @dataclass(frozen=True)
 class Recovered:
-    """The new bag, how many messages of each topic it holds, and what was found wrong with the old one.
+    """The new bag, its number of messages by topic, and the damage of the old bag.
 
-    `lost` counts the messages by topic that the old bag states and does not hold; empty where it states nothing.
+    `lost` is the number of messages by topic that the old bag states but does not hold; empty where it states none.
     """
 
     path: Path
@@ -50,14 +50,14 @@ class Recovered:
         return [f"{self.path}: {sum(self.counts.values())} messages recovered", *found]
 
 
-TELLING = 1.0  # s between two words on how many messages have been written
+TELLING = 1.0  # [s] between two progress messages
 
 
 def recover(path: str | Path, out: str | Path, storage: Storage = "mcap", tell: Tell = silent) -> Recovered:
-    """Write every whole message of the bag `path`, broken off or damaged as it may be, to the new bag `out`.
+    """Write every complete message of the incomplete or damaged bag `path` to the new bag `out`.
 
-    Topics, types, receive times and QoS are kept; the old bag is not touched. `tell` is told now and then how many messages
-    have been written. Raises InputError when nothing can be read, or `out` exists or cannot be written.
+    Topics, types, receive times and QoS are kept; the old bag is not changed. `tell` is called regularly with the
+    number of messages written. Raises InputError when nothing can be read, or `out` exists or cannot be written.
     """
     bag = Bag(path, verify=True)
     connections: dict[str, Connection] = {}
@@ -65,7 +65,7 @@ def recover(path: str | Path, out: str | Path, storage: Storage = "mcap", tell: 
     left_out: dict[str, str] = {}
     told = time.monotonic()
     with new_bag(out, storage) as writer:
-        # blocks of one buffer belong together: their messages are put back in the order of recording
+        # blocks of one buffer belong together: their messages are sorted into the order of recording
         for _, together in groupby(bag.blocks(), key=lambda block: id(block.buffer)):
             blocks = [block for block in together if block.topic.name not in left_out]
             for block in blocks:
@@ -80,7 +80,7 @@ def recover(path: str | Path, out: str | Path, storage: Storage = "mcap", tell: 
                 for block in blocks
                 if block.topic.name in connections
                 for start, stamp, data in zip(block.start.tolist(), block.log_ns.tolist(), block)
-                if stamp >= 0  # no clock reads less: such a message is damaged
+                if stamp >= 0  # no clock has negative times: such a message is damaged
             ]
             for _, name, stamp, data in sorted(messages, key=itemgetter(0)):
                 writer.write(connections[name], stamp, data)

@@ -1,5 +1,5 @@
-"""Rests at the ends of a record that a model of the machine cannot make: an output that stops although the drive goes on as before,
-and one that is held, or not yet pushed, at the beginning of a free motion."""
+"""Rests at the ends of a record that the machine's model cannot explain: an output that stops although the drive
+continues, and an output that is held, or not yet pushed, at the start of a free motion."""
 
 import math
 
@@ -9,24 +9,26 @@ from numpy.typing import NDArray
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-# of a record that a rest at its end has to last: a shorter one hardly changes what is fitted
+# least length of a rest at an end, as a share of the record: a shorter one hardly changes the fit
 LEAST_SHARE = 0.05
-WINDOWS = 3  # stretches before a rest in all of which a machine has to move, for that to be its custom
-AS_MUCH = 0.9  # of the usual travel of a drive, from which that goes on as before: steps of equal size have 1
-AT_REST = 0.02  # of the way that a motion leads away from its beginning, up to which it has not begun
-HALFWAY = 0.5  # of that way
-# times the time from the begin of a motion to half of its way that a rest before lasts at least. A machine that is let go at the first sample
-# stays within a fiftieth for a quarter of that time at most: that is the parabola of a constant force
+WINDOWS = 3  # stretches before a rest in all of which the machine must move
+# ratio to the usual travel of a drive above which the drive continues as before: steps of equal size have 1
+AS_MUCH = 0.9
+AT_REST = 0.02  # share of a motion's distance from its start up to which it has not begun
+HALFWAY = 0.5  # half of that distance
+# least duration of a rest before the motion, relative to the time from the start to half of the distance. A machine
+# released at the first sample stays within a fiftieth for at most a quarter of that time: the parabola of a
+# constant force
 LONG = 1.0
 
 
 def rest_notes(record: Record) -> tuple[str, ...]:
-    """A line on each rest at the beginning or the end of an output that the machine itself does not make."""
+    """A line on each rest at the start or end of an output that the machine does not cause."""
     return tuple(f"output: {said}" for said in rests_of(record))
 
 
 def rests_of(record: Record) -> tuple[str, ...]:
-    """What to tell of such rests, a sentence each."""
+    """Message about such rests, a sentence each."""
     time, begin, end = record.output.time, release(record), stop(record)
     found: list[str] = []
     if begin is not None:
@@ -44,7 +46,7 @@ def rests_of(record: Record) -> tuple[str, ...]:
 
 
 def use_line(record: Record) -> str | None:
-    """The line of signals.yaml that leaves such rests out; None where there are none."""
+    """The line of signals.yaml that excludes such rests; None where there are none."""
     time, begin, end = record.output.time, release(record), stop(record)
     if begin is None and end is None:
         return None
@@ -54,7 +56,7 @@ def use_line(record: Record) -> str | None:
 
 
 def stop(record: Record) -> float | None:
-    """When [s] an output stopped that stands still to the end while what drives goes on as where the output moved; None where none did."""
+    """Time [s] at which an output stops for good while the drive continues as before; None where none does."""
     drive = record.input or record.effort or record.reference
     value, time = record.output.value, record.output.time
     moves = np.flatnonzero(np.diff(value))
@@ -69,7 +71,7 @@ def stop(record: Record) -> float | None:
     if any(np.ptp(value[begin:end]) == 0.0 for begin, end in before):
         return None
     given = np.interp(time, drive.time, drive.value)
-    # the integral, too: a fast drive moves a machine less than a slow one of its size
+    # the integral is checked, too: a fast drive moves a machine less than a slow one of equal size
     for travel in (lambda part: float(np.ptp(given[part])), lambda part: _integral(time[part], given[part])):
         usual, now = (float(np.median([travel(slice(*one)) for one in part])) for part in (before, after))
         if now == 0.0 or now < AS_MUCH * usual:
@@ -78,7 +80,7 @@ def stop(record: Record) -> float | None:
 
 
 def release(record: Record) -> float | None:
-    """When [s] an output that nothing drives has rested at last, where it rests first; None where it is free from its first sample on."""
+    """End [s] of the rest with which an undriven output starts; None where it moves from its first sample on."""
     if any(one is not None for one in (record.input, record.effort, record.reference, record.forcing)):
         return None
     value, time = record.output.value, record.output.time
@@ -95,11 +97,11 @@ def release(record: Record) -> float | None:
 
 
 def _integral(time: Array, given: Array) -> float:
-    """Travel of the integral of what a drive (n,) is beside its mean."""
+    """Travel of the integral of a drive (n,) relative to its mean."""
     beside = given - given.mean()
     return float(np.ptp(np.cumsum(0.5 * (beside[1:] + beside[:-1]) * np.diff(time))))
 
 
 def _written(time: float) -> str:
-    """A time [s] to the millisecond, however late it is."""
+    """A time [s] written to the millisecond, whatever its size."""
     return f"{round(time, 3):.12g}"

@@ -1,46 +1,49 @@
-"""Rounding: the step of the grid that recorded values lie on.
+"""Rounding: the quantisation step of recorded values.
 
-A counter or a converter has one step. A number that is written with so many significant digits, or held in so many binary ones, has a
-step that grows with its size, tenfold from one power of ten to the next or twofold from one of two [Goldberg, What every computer
-scientist should know about floating-point arithmetic, ACM Computing Surveys 23 (1991)]; a scale that is applied later moves the places
-where it does, and the steps are found where the values show them.
+A counter or a converter has one step. A number with a fixed number of significant digits, decimal or binary, has a
+step that grows with its size: tenfold from one power of ten to the next, or twofold from one power of two to the
+next [Goldberg, What every computer scientist should know about floating-point arithmetic, ACM Computing Surveys 23
+(1991)]. A scale that is applied later moves these limits. So the steps are determined from the values themselves.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-ROUNDED = 0.97  # share of samples on a grid, from which a channel is rounded: some drivers mix in values of another source
-LEVELS = 8  # values that occur more than once, below which they make no grid
-HAIR = 1e-7  # of a signal's range, what lies nearer together than this is one value
-ON_GRID = (
-    0.99  # share of the steps between levels that are whole multiples, from which the levels lie on a grid
-)
-OFF = 0.05  # of a step, that a level on the grid may be off it
-# times the range of most samples, from which the others are no part of the signal: beyond it, steps of that range come near a hair
+# share of samples on a grid above which a channel is rounded: some drivers mix in values of another source
+ROUNDED = 0.97
+LEVELS = 8  # least number of values that occur more than once
+HAIR = 1e-7  # share of a signal's range below which two values are equal
+ON_GRID = 0.99  # share of steps between levels that are whole multiples, above which the levels lie on a grid
+OFF = 0.05  # deviation of a level from the grid, in steps
+# ratio to the range of most samples above which the others are not part of the signal: above it, steps of that
+# range approach HAIR
 OUTLYING_RANGES = 1e3
-BAND = 64  # levels next to each other in size whose own grid is sought: too many to be multiples of one step by chance
-BASES = (10.0, 2.0)  # of the digits that numbers are written with, or held in
-RUNG = 0.02  # of a step, that it may be off a power of the base times another one
-LADDER = 0.9  # share of bands with a grid whose steps differ by such powers; evenly read motions make grids of any step
-FLOATING = 0.5  # share of samples in bands with a grid, from which it depends on their size: among those near zero few are alike
+BAND = 64  # neighbouring levels whose own grid is determined: too many to be multiples of one step by chance
+BASES = (10.0, 2.0)  # of decimal and of binary numbers
+RUNG = 0.02  # relative deviation of a step from another one times a power of the base
+# share of bands with a grid whose steps differ by such powers; evenly sampled motions can form grids of any step
+LADDER = 0.9
+# share of samples in bands with a grid above which the step depends on the size: few values near zero are equal
+FLOATING = 0.5
 
 
 def resolution(value: Array) -> float:
-    """Step of the grid that 97 % of the values (n,) at least were rounded to, in their unit; 0 where they lie on none.
+    """Rounding step of at least 97 % of the values (n,), in their unit; 0 where they are not rounded.
 
-    Where it depends on their size it is the coarsest.
+    Where it depends on their size, the coarsest step.
     """
     return float(np.max(resolutions(value), initial=0.0))
 
 
 def shown_resolution(value: Array) -> float:
-    """The same; 0 where the values are few, which may be all that the signal has: a square wave is not rounded to its height."""
+    """The same; 0 where there are few distinct values, which may be all levels of the signal: a square wave is not
+    rounded to its height."""
     return resolution(value) if len(np.unique(value)) >= LEVELS else 0.0
 
 
 def resolutions(value: Array) -> Array:
-    """Step of the grid (n,) at each of the values (n,), the coarsest near it; 0 where they lie on none."""
+    """Rounding step (n,) at each of the values (n,), the coarsest nearby; 0 where they are not rounded."""
     bands = _bands(value)
     everywhere = _resolution(value)
     if bands is None:
@@ -54,14 +57,14 @@ def resolutions(value: Array) -> Array:
 
 
 def _resolution(value: Array) -> float:
-    """Step of the one grid that the values (n,) lie on; 0 without any."""
+    """Step of the one grid on which the values (n,) lie; 0 without any."""
     levels, count = np.unique(value, return_counts=True)
     if len(levels) < 2:
         return 0.0
     step, on_grid = _grid(levels, _span(value))
     if step == 0.0 or on_grid.mean() > ON_GRID:
         return step
-    common = levels[count > 1]  # a value that was not rounded hardly comes twice
+    common = levels[count > 1]  # an unrounded value seldom occurs twice
     if len(common) < LEVELS:
         return 0.0
     step, on_grid = _grid(common, _span(value))
@@ -73,7 +76,8 @@ def _resolution(value: Array) -> float:
 
 
 def _span(value: Array) -> float:
-    """The range of the values (n,); that of most of them where a few others are far beyond it, as where a bit fell over."""
+    """Range of the values (n,), or of most of them where a few others are far outside, for example because of a
+    flipped bit."""
     span = float(np.ptp(value))
     low, high = np.quantile(value, [0.5 * (1.0 - ROUNDED), 0.5 * (1.0 + ROUNDED)])
     usual = float(high - low)
@@ -81,10 +85,10 @@ def _span(value: Array) -> float:
 
 
 def _bands(value: Array) -> tuple[Array, Array] | None:
-    """Least size (m,) of bands of levels, from small to large, and the step (m,) of their grids; None for too few levels.
+    """Least size (m,) of bands of levels, in increasing order, and the step (m,) of their grids; None for too few levels.
 
-    The step grows with the size, so that a band in which none shows has that of the one below; and a band that begins with finer
-    levels has that of the next one.
+    The step grows with the size. So a band without a detected step has that of the band below, and a band that
+    starts with finer levels has that of the next one.
     """
     levels = np.unique(np.abs(value))
     count = len(levels) // BAND
@@ -104,9 +108,11 @@ def _bands(value: Array) -> tuple[Array, Array] | None:
 
 
 def _ladder(steps: Array, least: Array, largest: Array) -> Array:
-    """Those of the steps (m,) of bands that are one of them times a power of 10 or of 2; the others 0, and all where such powers differ
-    in no two of them, too many are others, or the powers do not follow the size of the levels, from `least` to `largest` (m,) in each band:
-    so many digits are one step from one power of the base to the next, wherever a scale has moved these.
+    """Those of the steps (m,) of bands that are equal up to powers of 10 or of 2; the others are 0.
+
+    All are 0 in three cases: no two steps differ by such a power, too many steps are others, or the powers do not
+    follow the size of the levels, from `least` to `largest` (m,) in each band. With a fixed number of digits the
+    step is constant from one power of the base to the next, wherever a scale has moved these powers.
     """
     for base in BASES:
         seen = steps > 0.0
@@ -127,9 +133,10 @@ def _ladder(steps: Array, least: Array, largest: Array) -> Array:
 
 
 def _grid(levels: Array, span: float) -> tuple[float, NDArray[np.bool_]]:
-    """Step of the grid that distinct levels (n,) seem to lie on, 0 without any, and which steps between them are multiples of it."""
+    """Step of the grid of distinct levels (n,), 0 without any, and a mask of the steps between levels that are
+    multiples of it."""
     steps = np.diff(levels)
-    steps = steps[steps > HAIR * span]  # finer ones are the representation of numbers
+    steps = steps[steps > HAIR * span]  # finer steps are due to the number format
     if len(steps) == 0:
         return 0.0, np.empty(0, dtype=bool)
     step = float(np.median(steps[steps < 1.5 * steps.min()]))

@@ -1,4 +1,4 @@
-"""Recordings that are given twice: one that is fitted cannot be held out too, and one that is answered twice counts once."""
+"""Detects recordings that are given twice: a fitted one cannot be held out, and a duplicate counts once."""
 
 import hashlib
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from rhythmid.record.record import Record
 
 
 def check_held_out(fitted: Sequence[Record | JointRecord], holdout: Sequence[Record | JointRecord]) -> None:
-    """Raise InputError where a held-out record is one of the fitted ones, whatever either is called."""
+    """Raise InputError where a held-out record is one of the fitted ones, whatever their names."""
     for one in holdout:
         if any(_same(one, other) for other in fitted):
             raise InputError(
@@ -20,13 +20,14 @@ def check_held_out(fitted: Sequence[Record | JointRecord], holdout: Sequence[Rec
 
 
 def content_digest(records: Sequence[Record | JointRecord]) -> str:
-    """A digest of what was measured, in hexadecimal digits: recordings that have the same are copies, whatever they are called."""
+    """Digest of the measured data, in hexadecimal digits: recordings with the same digest are copies, whatever
+    their names."""
     digest = hashlib.sha256()
     for record in records:
         for one in _outputs(record):
             digest.update(
                 np.rint(1e9 * one.output.time).astype(np.int64).tobytes()
-            )  # stamps have nanoseconds
+            )  # resolution of stamps: nanoseconds
             digest.update(one.output.value.tobytes())
     return digest.hexdigest()
 

@@ -1,4 +1,4 @@
-"""signals.yaml: which recorded channel is what.
+"""signals.yaml: mapping of recorded channels to roles.
 
     time: header                      # header | receive | {column: t_ms, scale: 0.001} | {sample_rate: 610.3515625}
     input:   {topic: /hopper/excitation,   field: "effort[leg]"}
@@ -9,13 +9,15 @@
     # on output: kind: position (default) | velocity | acceleration
     parameters: {position_control.proportional: 12.5}      # what the model's parameters were in this record
 
-A channel is a field of a topic, or a `column` of a `file` (.mat, .csv, .npz; relative to signals.yaml; `tables: {file: …}`
-names one file for all; without either it is a column of the table that is read). `time:` may be given for a channel, too, as for
-commands whose messages bear no stamp: `input: {topic: /command, field: data, time: receive}`. Its value is `scale` * recorded + `offset`, in `unit`. `input: none` says that nothing but the
-forcing, if that, drives the machine. `forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}` states
-amplitude * cos(2π frequency t + phase) in the record's time. A parameter of the model that differs from record to record, such
-as a controller's gain, is declared by its value, or where one file is for several records, by record:
-`parameters: {position_control.proportional: {slow: 12.5, fast: 25}}`. What all records declare is not estimated.
+A channel is a field of a topic, or a `column` of a `file` (.mat, .csv, .npz; relative to signals.yaml). `tables:
+{file: …}` names one file for all channels; without a file it is a column of the table that is read. `time:` may
+also be given for a single channel, for example for commands without stamps: `input: {topic: /command, field: data,
+time: receive}`. A channel's value is `scale` * recorded + `offset`, in `unit`. `input: none` declares that at most
+the forcing drives the machine. `forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}` states amplitude * cos(2π
+frequency t + phase) in the record's time. A model parameter with a different value in each record, such as a
+controller's gain, is declared by its value. If one file is used for several records, it is declared by record:
+`parameters: {position_control.proportional: {slow: 12.5, fast: 25}}`. A parameter that all records declare is not
+estimated.
 """
 
 import math
@@ -49,8 +51,8 @@ KEYS = ConfigDict(extra="forbid")
 
 @dataclass(frozen=True)
 class Clock:
-    """Where times come from: `header` stamps, `receive` times, a `column` of the table, whose numbers are `scale` seconds each,
-    or a sample `rate` [Hz]."""
+    """Source of times: `header` stamps, `receive` times, a `column` of the table with numbers in units of `scale`
+    seconds, or a sample `rate` [Hz]."""
 
     kind: Literal["header", "receive", "column", "rate"] = "header"
     column: str | int = ""
@@ -60,7 +62,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Sinusoid:
-    """Forcing known by formula: amplitude * cos(2π frequency [Hz] t [s] + phase [rad])."""
+    """Forcing by formula: amplitude * cos(2π frequency [Hz] t [s] + phase [rad])."""
 
     __pydantic_config__ = KEYS
     amplitude: Annotated[Number, Limits(ge=-1e12, le=1e12)]
@@ -73,9 +75,9 @@ class Sinusoid:
 
 @dataclass(frozen=True)
 class Source:
-    """Where one channel comes from: `field` of `topic`, or `column` of `file`, None for the table that is read.
+    """Source of one channel: `field` of `topic`, or `column` of `file`, None for the table that is read.
 
-    `time` is where its times come from, None where that is as for the whole record.
+    `time` is the source of its times, None for that of the whole record.
     """
 
     unit: str
@@ -86,10 +88,10 @@ class Source:
     scale: float = 1.0
     offset: float = 0.0
     time: Clock | None = None
-    place: str = ""  # "signals.yaml:3: input: ", to begin a complaint with
+    place: str = ""  # "signals.yaml:3: input: ", as the start of a message
 
     def clock(self, usual: Clock) -> Clock:
-        """Where its times come from, `usual` where it has no clock of its own."""
+        """Source of its times: its own clock, else `usual`."""
         return self.time or usual
 
     def __str__(self) -> str:
@@ -100,18 +102,19 @@ class Source:
 
 @dataclass(frozen=True)
 class Signals:
-    """Contents of a signals.yaml.
+    """Content of a signals.yaml.
 
     Attributes
     ----------
     channels : role (`input`, `output`, `forcing`, `velocity`, `effort`, `reference`) -> source.
-    forcing_law : the forcing where it is given by formula.
-    input_kind : what the input is.
-    output_kind : what the output measures; an acceleration is the mass's own, not relative to a moving base.
-    hold : how the input continues between its samples; None stands for the default of its kind of record.
+    forcing_law : the forcing, where it is given by a formula.
+    input_kind : kind of the input.
+    output_kind : kind of the output; an acceleration is absolute, not relative to a moving base.
+    hold : interpolation of the input between its samples; None for the default of its kind of record.
     use : [t0, t1) in seconds of the record's time.
     optional : roles that may be absent from the bag (the forcing of the default signals).
-    parameters : values of the model's parameters in this record, by "element.parameter"; or by record's name for each.
+    parameters : values of the model's parameters in this record, by "element.parameter"; for several records, by
+        record name.
     """
 
     channels: Mapping[str, Source]
@@ -126,7 +129,8 @@ class Signals:
     parameters: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict)
 
     def declared(self, record: str) -> dict[str, float]:
-        """Values of the model's parameters that are declared for a record. Raises InputError where it is left out of a list."""
+        """Values of the model's parameters that are declared for a record. Raises InputError where a list by record
+        lacks this one."""
         found: dict[str, float] = {}
         for name, value in self.parameters.items():
             if isinstance(value, Mapping):
@@ -144,7 +148,8 @@ class Signals:
         return not self.channels["output"].topic
 
     def of_table(self, path: Path) -> "Signals":
-        """The same channels of the table at `path`, where they name no file. Raises InputError when they need no such table."""
+        """The same channels in the table at `path`, where they name no file. Raises InputError when they need no
+        such table."""
         if not self.from_tables:
             raise InputError(f"{self.path}: names topics of a bag, but {path} is a table: name its columns")
         if all(source.file is not None for source in self.channels.values()):
@@ -157,17 +162,17 @@ class Signals:
 
     @classmethod
     def load(cls, path: str | Path) -> "Signals":
-        """The signals.yaml at `path`. Raises InputError naming line and key of what is wrong."""
+        """The signals.yaml at `path`. Raises InputError with line and key of an error."""
         return _signals(read(path), Path(path))
 
     @classmethod
     def from_text(cls, text: str, path: str | Path = "signals.yaml") -> "Signals":
-        """The signals in a YAML text that stands for the file `path`."""
+        """The signals in a YAML text; `path` is the file name used in messages."""
         return _signals(parse(text, str(path)), Path(path))
 
     @classmethod
     def from_node(cls, document: Node, path: str | Path) -> "Signals":
-        """The signals in a document that was read from the file `path`."""
+        """The signals in a document read from the file `path`."""
         return _signals(document, Path(path))
 
     @classmethod
@@ -223,7 +228,7 @@ AnyClock = Annotated[Annotated[_Clock, InKeys] | Annotated[Literal["header", "re
 
 @dataclass(frozen=True)
 class _Channel:
-    """A channel as it is written."""
+    """A channel as written in the file."""
 
     __pydantic_config__ = KEYS
     topic: str | None = None
@@ -270,7 +275,7 @@ Absent = BeforeValidator(_not_none)
 
 @dataclass(frozen=True)
 class _Document:
-    """signals.yaml as it is written."""
+    """signals.yaml as written."""
 
     __pydantic_config__ = KEYS
     time: AnyClock | None = None

@@ -1,7 +1,7 @@
-"""A table that holds several recordings, one below the other or each in a struct of its own, as a table for each of them.
+"""Splits a table with several recordings, one after the other or each in its own struct, into one table per recording.
 
-Data sets for learning keep their episodes in one table, with a column that numbers them; logs that were appended to one another begin
-their time anew; MATLAB's struct arrays hold a run in each element.
+Data sets for machine learning keep their episodes in one table, with a column that numbers them. In concatenated
+logs the time restarts. MATLAB's struct arrays hold one run per element.
 """
 
 import re
@@ -23,15 +23,15 @@ from rhythmid.record.table import Table, table_name
 NUMBERED = re.compile(
     r"(?:.*[._ ])?(?:episode|trial|run|trajectory|segment)(?:[._ ]?(?:index|id|number|nr|no))?", re.IGNORECASE
 )
-MOST_RECORDINGS = 10_000  # recordings that a table may be split into
+MOST_RECORDINGS = 10_000  # largest number of recordings in a table
 Rows = NDArray[np.int64]
 
 
 def recordings(table: Table, column: str | None = None) -> tuple[str, dict[str, Rows]]:
-    """The rows of each recording by its name, and in words what tells them apart: the column that is named, else one that numbers
-    recordings, else a time that goes back.
+    """The rows of each recording by its name, and the criterion in words: the named column, else a column that
+    numbers recordings, else a time that goes back.
 
-    Raises InputError where the column is not there, nothing tells recordings apart, or there are far too many.
+    Raises InputError where the column does not exist, nothing separates recordings, or there are far too many.
     """
     if column is None:
         whole = (name for name, value in table.vectors() if NUMBERED.fullmatch(name) and _numbers_rows(value))
@@ -68,14 +68,14 @@ def _name(number: float) -> str:
 
 
 def _numbers_rows(value: NDArray[np.float64]) -> bool:
-    """Whether a column has whole numbers, each in rows that follow one another."""
+    """Whether a column has whole numbers, each in one contiguous block of rows."""
     return bool(np.all(value == np.rint(value))) and len(np.unique(value)) == 1 + np.count_nonzero(
         np.diff(value)
     )
 
 
 def split(table: Table, rows: Mapping[str, Rows], folder: Path) -> list[Path]:
-    """Write the rows of each recording as `folder/<table>_<name>.npz`; columns of words are left out.
+    """Write the rows of each recording as `folder/<table>_<name>.npz`; text columns are left out.
 
     Raises InputError where the folder exists or cannot be written.
     """
@@ -97,7 +97,7 @@ def split_runs(table: Table, runs: Runs, folder: Path) -> list[Path]:
 
 
 def _numbers(columns: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """Those of the columns that hold numbers."""
+    """The columns that hold numbers."""
     arrays = {name: np.asarray(values) for name, values in columns.items()}
     return {name: values for name, values in arrays.items() if values.dtype.kind in "fiub"}
 
@@ -105,7 +105,7 @@ def _numbers(columns: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
 def _written(
     table: Table, names: list[str], parts: Iterable[Mapping[str, NDArray[Any]]], folder: Path
 ) -> list[Path]:
-    """The files that hold the parts, all of them or none."""
+    """Files with the parts; all of them are written or none."""
     if folder.exists():
         raise InputError(f"{folder}: exists already; name another folder or remove it")
     require_writable(folder)
@@ -114,7 +114,7 @@ def _written(
     try:
         partial.mkdir(parents=True, exist_ok=True)
         for name, columns in zip(made, parts, strict=True):
-            with ZipFile(partial / name, "w") as archive:  # savez takes no column called `file`
+            with ZipFile(partial / name, "w") as archive:  # savez accepts no column called `file`
                 for column, values in columns.items():
                     with archive.open(f"{column}.npy", "w") as file:
                         write_array(file, values, allow_pickle=False)
@@ -122,5 +122,5 @@ def _written(
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror}") from None
     finally:
-        rmtree(partial, ignore_errors=True)  # what an interruption or a full disk has left of it
+        rmtree(partial, ignore_errors=True)  # left over after an interruption or on a full disk
     return [folder / name for name in made]

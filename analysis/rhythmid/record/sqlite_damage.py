@@ -1,4 +1,4 @@
-"""What of an sqlite3 bag is damaged: broken pages passed over, structure and checksums compared."""
+"""Damage of an sqlite3 bag: skips broken pages, compares structure and checksums."""
 
 import sqlite3
 import struct
@@ -7,14 +7,15 @@ from rhythmid.record.sqlite_writer import checksum
 
 
 def in_order(number: object, before: int) -> int:
-    """The number of a row behind the row `before`. A damaged tree may lead to rows that it has led to already, without end: an error then."""
+    """The number of a row after the row `before`. A damaged tree may return to earlier rows endlessly: then an
+    error is raised."""
     if not isinstance(number, int) or number <= before:
         raise sqlite3.DatabaseError("its table 'messages' is out of order")
     return number
 
 
 def next_readable(database: sqlite3.Connection, after: int) -> int | None:
-    """The first row of `messages` behind `after` that can be read; None if there is none."""
+    """The first readable row of `messages` after `after`; None if there is none."""
 
     def first(low: int) -> int | None:
         row = database.execute(
@@ -36,7 +37,7 @@ def next_readable(database: sqlite3.Connection, after: int) -> int | None:
     else:
         return None
     whole = broken + step
-    while whole - broken > 1:  # rows behind `broken` cannot be read, those behind `whole` can
+    while whole - broken > 1:  # rows after `broken` cannot be read, those after `whole` can
         middle = (broken + whole) // 2
         try:
             found, whole = first(middle), middle
@@ -46,7 +47,7 @@ def next_readable(database: sqlite3.Connection, after: int) -> int | None:
 
 
 def wrong_checksums(database: sqlite3.Connection) -> list[str]:
-    """What sqlite's own check and the checksums of messages, where there are any, say against a bag; one phrase each."""
+    """Errors found by sqlite's own check and by the checksums of messages, where there are any; one phrase each."""
     found = []
     try:
         (answer,) = database.execute("PRAGMA quick_check(1)").fetchone()

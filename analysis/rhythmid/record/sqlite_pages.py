@@ -1,7 +1,8 @@
-"""Rows of an sqlite database that sqlite cannot open, because its beginning is damaged, read page by page.
+"""Reads rows page by page from an sqlite database that sqlite cannot open because its beginning is damaged.
 
-The first page holds the header and the schema, without which sqlite opens nothing. The rows lie in the leaf pages of its tables, and each tells
-its own number, length and types (https://sqlite.org/fileformat.html); to which table it belongs its types tell.
+The first page holds the header and the schema; without them sqlite cannot open the file. The rows are in the leaf
+pages of its tables. Each row states its own number, length and types (https://sqlite.org/fileformat.html). The
+types show to which table it belongs.
 """
 
 import struct
@@ -13,10 +14,10 @@ import numpy as np
 Row = tuple[int, list[Any]]  # number and values; the values of an INTEGER PRIMARY KEY are None
 PAGE_SIZES = tuple(2**power for power in range(9, 17))  # bytes
 LEAF = 0x0D  # first byte of a page with rows of a table
-_HEAD = 8  # bytes before the places of a leaf page's rows
-_FILE_HEAD = 100  # bytes of the first page before what other pages begin with
-_TRIED = 2**20  # bytes from the beginning by whose rows the size of the pages is found
-_MOST_VALUES = 32  # of a row of a recording; it has six at most
+_HEAD = 8  # bytes before the row positions of a leaf page
+_FILE_HEAD = 100  # bytes of the first page before the usual page header
+_TRIED = 2**20  # bytes from the beginning whose rows are used to find the page size
+_MOST_VALUES = 32  # largest number of values in a row; a recording has at most six
 
 
 class Pages:
@@ -27,7 +28,7 @@ class Pages:
         self.size = max(PAGE_SIZES, key=self._readable)
 
     def rows(self, wanted: Callable[[list[Any]], bool]) -> Iterator[Row]:
-        """Rows whose values are `wanted`, each number once, in their order."""
+        """Rows whose values are `wanted`, each row number once, in order."""
         places = []
         for page in self._leaves(self.size):
             first = next((row for row in self._rows_of(page) if wanted(row[1])), None)
@@ -41,12 +42,12 @@ class Pages:
                     yield number, values
 
     def _readable(self, size: int) -> int:
-        """Number of rows in the first pages, were they of this size."""
+        """Number of rows in the first pages, if pages had this size."""
         self.size = size
         return sum(1 for page in self._leaves(size) if page < _TRIED for _ in self._rows_of(page))
 
     def _leaves(self, size: int) -> Iterator[int]:
-        """Offsets of the pages that begin like leaf pages."""
+        """Offsets of the pages that start like leaf pages."""
         whole = len(self._data) // size
         kinds = np.frombuffer(self._data[: whole * size], dtype=np.uint8)[::size]
         yield from (np.flatnonzero(kinds == LEAF) * size).tolist()
@@ -54,7 +55,7 @@ class Pages:
             yield 0
 
     def _rows_of(self, page: int) -> Iterator[Row]:
-        """The rows of a leaf page that are whole."""
+        """The complete rows of a leaf page."""
         data = self._data[page : page + self.size]
         head = _FILE_HEAD if page == 0 else 0
         (count,) = struct.unpack_from(">H", data, head + 3)
@@ -74,7 +75,7 @@ class Pages:
         return number, _values(self._payload(data, at, size))
 
     def _payload(self, data: memoryview, at: int, size: int) -> bytes:
-        """The content of a row, put together where it goes on in other pages. Raises ValueError."""
+        """The content of a row, including its overflow pages. Raises ValueError."""
         if not 0 < size <= len(self._data):
             raise ValueError("a row is longer than the file")
         if size <= self.size - 35:
@@ -97,7 +98,7 @@ class Pages:
 
 
 def _integer(data: bytes | memoryview, at: int) -> tuple[int, int]:
-    """An integer of variable length, and where it ends."""
+    """An integer of variable length, and the position of its end."""
     value = 0
     for place in range(8):
         byte = data[at + place]
@@ -107,11 +108,11 @@ def _integer(data: bytes | memoryview, at: int) -> tuple[int, int]:
     return value << 8 | data[at + 8], at + 9
 
 
-_LENGTHS = (0, 1, 2, 3, 4, 6, 8, 8, 0, 0)  # bytes of values by the number of their type
+_LENGTHS = (0, 1, 2, 3, 4, 6, 8, 8, 0, 0)  # bytes of values by their type number
 
 
 def _values(content: bytes) -> list[Any]:
-    """The values of a row. Raises ValueError where its lengths do not agree."""
+    """The values of a row. Raises ValueError where its lengths are inconsistent."""
     head, at = _integer(content, 0)
     if not at < head <= len(content):
         raise ValueError("the head of a row is longer than the row")

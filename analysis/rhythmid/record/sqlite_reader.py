@@ -1,4 +1,4 @@
-"""sqlite3 storage files of rosbag2, also those whose recorder was killed in the middle of a transaction."""
+"""sqlite3 storage files of rosbag2, including those whose recorder was killed during a transaction."""
 
 import mmap
 import os
@@ -21,16 +21,17 @@ from rhythmid.record.sqlite_damage import in_order, next_readable, wrong_checksu
 from rhythmid.record.sqlite_pages import Pages
 
 _ROWS = 50_000  # rows fetched at once,
-_BYTES = 64 << 20  # and bytes, behind which no further one is fetched
+_BYTES = 64 << 20  # and bytes after which no further row is fetched
 _LARGEST_ROW = 256 << 20  # bytes; sqlite's own limit is larger, and a database may compute its rows
 
 
 class SqliteReader:
-    """One .db3 file. `truncated` tells whether its recorder was killed; `topics` lists all topics once opened.
+    """One .db3 file. `truncated` says whether its recorder was killed; `topics` lists all topics once opened.
 
-    A journal beside the file holds what sqlite needs to undo or finish the last transaction. That needs writing, so
-    file and journal are copied and the copy is opened; the recording itself is never changed. So is a file that was cut
-    off, to be read up to the cut. Where sqlite cannot open a file, because its beginning is damaged, it is read page by page.
+    A journal beside the file holds the data that sqlite needs to undo or finish the last transaction. That requires
+    writing, so file and journal are copied and the copy is opened; the recording itself is never changed. A
+    truncated file is copied, too, and read up to its end. A file that sqlite cannot open because its beginning is
+    damaged is read page by page.
     """
 
     def __init__(self, path: Path) -> None:
@@ -66,14 +67,13 @@ class SqliteReader:
                 for file in (self.path, *self._journals):
                     shutil.copyfile(file, Path(folder) / file.name)
                 copy = Path(folder) / self.path.name
-                if (
-                    cut_off
-                ):  # zeros for the pages that are lost, or sqlite would not even read those that are there
+                if cut_off:  # zeros for the lost pages, without which sqlite would not read the existing ones
                     os.truncate(copy, size - size % page)
                     os.truncate(copy, whole)
                 yield from self._read(copy, "mode=rw", wanted)
         except sqlite3.Error as error:
-            reason = f"is not a readable sqlite3 bag: {' '.join(str(error).split())[:200]}"  # sqlite quotes whole columns
+            # sqlite quotes whole columns
+            reason = f"is not a readable sqlite3 bag: {' '.join(str(error).split())[:200]}"
             if self._last or not _is_damage(error):
                 raise InputError(f"{self.path}: {reason}") from None
             yield from self._by_pages(wanted, reason)
@@ -85,7 +85,7 @@ class SqliteReader:
             database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST_ROW)
             database.execute(
                 "PRAGMA trusted_schema = OFF"
-            )  # no function with side effects, should its schema call one
+            )  # no function with side effects, in case the schema calls one
             numbered = _topics(database)
             self.topics = {topic.name: topic for topic in numbered.values()}
             chosen = {number: topic for number, topic in numbered.items() if wanted(topic)}
@@ -135,7 +135,7 @@ class SqliteReader:
             )
 
     def _rows(self, database: sqlite3.Connection, chosen: str) -> Iterator[tuple[int, int, bytes]]:
-        """The rows of the chosen topics; pages that cannot be read are passed over and told."""
+        """The rows of the chosen topics; unreadable pages are skipped and reported."""
         query = f"SELECT id, topic_id, timestamp, data FROM messages WHERE topic_id IN ({chosen}) AND id > ? ORDER BY id"
         while True:
             try:
@@ -155,7 +155,7 @@ class SqliteReader:
                 self._last = following - 1
 
     def _messages(self, rows: list[tuple[int, int, bytes]]) -> list[tuple[int, int, bytes]]:
-        """Those of the rows that are messages."""
+        """The rows that are messages."""
         found = [row for row in rows if [*map(type, row)] == [int, int, bytes]]
         if len(found) < len(rows):
             if not found:
@@ -164,29 +164,29 @@ class SqliteReader:
         return found
 
     def wrong_checksums(self) -> list[str]:
-        """What sqlite's own check and the checksums of a finished file say against it, one phrase each."""
+        """Errors found by sqlite's own check and by the checksums of a finished file, one phrase each."""
         if self.truncated or self.by_pages:
             return []
         with closing(sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True)) as database:
             return wrong_checksums(database)
 
     def counted(self) -> dict[str, int]:
-        """Messages by topic, as the file counts them: not at all."""
+        """Number of messages by topic as stated in the file: sqlite files state none."""
         return {}
 
 
 class _NoTables(sqlite3.DatabaseError):
-    """The schema does not name the tables of a recording."""
+    """The schema lacks the tables of a recording."""
 
 
 def _is_damage(error: sqlite3.Error) -> bool:
-    """Whether sqlite finds no database, or a damaged one."""
+    """Whether the error means that the file is no database, or a damaged one."""
     code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_OK)
     return isinstance(error, _NoTables) or code & 0xFF in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT)
 
 
 def _batch(rows: Iterator[tuple[int, int, bytes]]) -> list[tuple[int, int, bytes]]:
-    """The next rows, as many as memory may hold at once."""
+    """The next rows, within the limits for memory."""
     batch: list[tuple[int, int, bytes]] = []
     fetched = 0
     for row in islice(rows, _ROWS):
@@ -198,7 +198,7 @@ def _batch(rows: Iterator[tuple[int, int, bytes]]) -> list[tuple[int, int, bytes
 
 
 def _sizes_by_header(head: bytes) -> tuple[int, int]:
-    """Sizes [bytes] of a page and of the whole database by the first 32 of its bytes (https://sqlite.org/fileformat.html)."""
+    """Sizes [bytes] of a page and of the whole database from the first 32 bytes (https://sqlite.org/fileformat.html)."""
     if len(head) < 32:
         return 1, 0
     page, pages = struct.unpack_from(">H", head, 16)[0], struct.unpack_from(">I", head, 28)[0]
@@ -226,7 +226,8 @@ def _topics(database: sqlite3.Connection) -> dict[int, Topic]:
 
 
 def _numbered(topics: Sequence[tuple[Any, ...]], definitions: Sequence[tuple[Any, ...]]) -> dict[int, Topic]:
-    """Topics by number, of rows with number, name, type, encoding and QoS, and of rows with type, definition and its form."""
+    """Topics by number, from rows with number, name, type, encoding and QoS, and from rows with type, definition
+    and its format."""
     known = {name: (definition, form) for name, definition, form in definitions}
     return {
         number: Topic(name, msgtype, encoding, *known.get(msgtype, ("", "")), *profiles)
@@ -234,7 +235,7 @@ def _numbered(topics: Sequence[tuple[Any, ...]], definitions: Sequence[tuple[Any
     }
 
 
-# the rows of a recording's tables, by their types; the first value, an INTEGER PRIMARY KEY, stands in the row's number
+# types of the rows in a recording's tables; the first value, an INTEGER PRIMARY KEY, is the row's number
 
 
 def _is_message(values: Sequence[object]) -> bool:

@@ -1,4 +1,4 @@
-"""sqlite3 bags written by whole arrays of messages, with checksums."""
+"""Writes sqlite3 bags by whole arrays of messages, with checksums."""
 
 import sqlite3
 import struct
@@ -26,7 +26,7 @@ def checksum(topic: int, timestamp: int, data: bytes | memoryview, before: int) 
 
 
 class SqliteWriter(Sqlite3Writer):
-    """rosbags' sqlite3 storage with `write_arrays` and `flush`, as `McapWriter` has them."""
+    """rosbags' sqlite3 storage with `write_arrays` and `flush`, as in `McapWriter`."""
 
     def __init__(self, path: Path, compression: CompressionMode, name: str) -> None:
         if compression == CompressionMode.STORAGE:

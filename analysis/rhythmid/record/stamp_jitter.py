@@ -1,9 +1,11 @@
-"""Jitter of measurement stamps, read off the samples alone: noise between neighbours that grows with the slope of the signal.
+"""Jitter of timestamps, estimated from the samples alone: noise between neighbours that grows with the slope of the
+signal.
 
-A sample whose stamp is out by ε is off by ε times the slope s, so that the variance of the noise is σ² + j² s² with the standard
-deviation j of the jitter (T. M. Souders et al., IEEE Trans. Instrum. Meas. 39 (1990) 80). Noise is what a polynomial through the
-neighbours does not tell of a sample. No model is asked: what a model lacks grows with speed, too. Times that follow from a
-declared rate are no stamps, so that of a record without any (`Record.stamped`) no jitter is sought.
+A sample whose timestamp has an error ε is off by ε times the slope s. So the variance of the noise is σ² + j² s²,
+with the standard deviation j of the jitter (T. M. Souders et al., IEEE Trans. Instrum. Meas. 39 (1990) 80). The
+noise is the deviation of a sample from a polynomial through its neighbours. No model is used, because the error of
+an incomplete model grows with speed, too. Times that follow from a declared rate are no timestamps, so no jitter is
+estimated for a record without any (`Record.stamped`).
 """
 
 import math
@@ -18,48 +20,45 @@ from rhythmid.record.timing import GAP, nominal_period
 
 Array = NDArray[np.float64]
 Samples = tuple[Array, Array]  # times [s] and values of one stretch
-SIDES = (3, 4)  # neighbours on either side of the polynomial, and of the finer one that has to bear it out
-AGREE = (
-    1.5  # factor by which the variances that both find may differ: what a finer polynomial tells is motion
-)
-SHORTEST_STEP_IN_PERIODS = (
-    0.3  # periods; where samples follow one another sooner, a polynomial through them swings
-)
-BINS = 16  # of equally many samples, by slope
-SAMPLES_OF_A_BIN = 100  # samples of a bin
+SIDES = (3, 4)  # neighbours on either side for the polynomial, and for the finer one that must confirm it
+AGREE = 1.5  # largest ratio of the two variances: a difference between the polynomials is motion
+# in periods; where samples are closer together, a polynomial through them oscillates
+SHORTEST_STEP_IN_PERIODS = 0.3
+BINS = 16  # by slope, with equal numbers of samples
+SAMPLES_OF_A_BIN = 100  # least samples per bin
 SLOWER = (
     2 / 3
-)  # share of the slower samples that have to show it, too: kinks of a motion, such as impacts, come at the highest speed
-JITTER_SHOWN = 5.0  # standard deviations from which jitter is taken to be there
-SHOWN_BY_SLOWER = 3.0  # the same among the slower samples
-RESOLVED_JITTER = (
-    1e-3  # of a sample period, below which jitter is beyond what clocks and numbers of a log resolve
+    # share of slower samples that must also show the jitter: kinks of a motion, such as impacts, occur at the highest speed
 )
-WORTH_WEIGHING = 0.05  # of the variance of the noise at rest, below which weights would hardly differ
+JITTER_SHOWN = 5.0  # standard deviations above which jitter is detected
+SHOWN_BY_SLOWER = 3.0  # the same among the slower samples
+# share of a sample period below which jitter is finer than clocks and logged numbers resolve
+RESOLVED_JITTER = 1e-3
+WORTH_WEIGHING = 0.05  # share of the noise variance at rest below which weights would hardly differ
 OUTLYING = 4.0  # robust standard deviations of a bin at which a deviation is clipped
-CORRELATED = 4.0  # neighbouring deviations share samples: their squares count for as many times fewer
-NORMAL_MEDIAN = 0.6745  # of the absolute value of a normal deviate
-COARSE = 2.0  # steps of a rounded signal between samples, below which rounding is no noise
-WIDTHS = (1, 2, 4, 8, 16, 32)  # samples on either side from which the slope is taken, the least that suffices
-STEADY = 0.02  # share of noise in the mean square of the slope, at most
+CORRELATED = 4.0  # neighbouring deviations share samples: factor by which their squares count less
+NORMAL_MEDIAN = 0.6745  # median absolute value of a standard normal deviate
+COARSE = 2.0  # rounding steps between samples; below this, rounding errors are not noise
+WIDTHS = (1, 2, 4, 8, 16, 32)  # samples on either side for the slope; the smallest sufficient width is taken
+STEADY = 0.02  # largest share of noise in the mean square of the slope
 
 
 @dataclass(frozen=True)
 class StampJitter:
-    """Jitter of stamps: its standard deviation `std` [s], how well that is known, `uncertainty` [s] (a standard deviation), and the
-    standard deviation `noise` of a sample at rest, in the unit of the signal."""
+    """Timestamp jitter: its standard deviation `std` [s], the standard deviation of that estimate `uncertainty`
+    [s], and the standard deviation `noise` of a sample at rest, in the unit of the signal."""
 
     std: float
     uncertainty: float
     noise: float
 
     def relative(self, time: Array, value: Array) -> Array:
-        """Standard deviation (n,) of each sample's noise, as a multiple of that at rest."""
+        """Standard deviation (n,) of each sample's noise, relative to that at rest."""
         return np.sqrt(1.0 + (self.std * slope_of(time, value, self.noise) / self.noise) ** 2)
 
 
 def stamp_jitter(stretches: Sequence[Samples]) -> StampJitter | None:
-    """Jitter of the stamps of one channel, recorded in these stretches; None where it does not show."""
+    """Timestamp jitter of one channel, recorded in these stretches; None where none is detected."""
     given = [(t, v) for t, v in stretches if len(t) > 4 * max(SIDES)]
     if sum(len(t) for t, _ in given) < BINS * SAMPLES_OF_A_BIN:
         return None
@@ -70,12 +69,12 @@ def stamp_jitter(stretches: Sequence[Samples]) -> StampJitter | None:
     if coarse is None or fine is None or coarse.std > math.sqrt(AGREE) * fine.std:
         return None
     if np.ptp(steps) > 0.0 and fine.noise <= step:
-        return None  # noise that is the rounding of numbers grows with their size, and so do speeds where these swing
+        return None  # rounding errors of numbers grow with their size, and so do speeds in an oscillation
     return fine
 
 
 def _found(stretches: Sequence[Samples], sides: int, period: float, step: float) -> StampJitter | None:
-    """Jitter by a polynomial through as many neighbours on either side."""
+    """Jitter estimated with a polynomial through `sides` neighbours on either side."""
     deviations = [_deviations(time, value, sides, period) for time, value in stretches]
     left = np.concatenate([d for d, _ in deviations])
     noise = float(np.median(np.abs(left))) / NORMAL_MEDIAN if len(left) else 0.0
@@ -103,7 +102,8 @@ def _found(stretches: Sequence[Samples], sides: int, period: float, step: float)
 
 
 def _deviations(time: Array, value: Array, sides: int, period: float) -> tuple[Array, NDArray[np.int64]]:
-    """Of samples, how far they are off the polynomial through their neighbours, scaled to the noise of one sample; and which ones."""
+    """Deviations of samples from the polynomial through their neighbours, scaled to the noise of one sample; and
+    the samples' indices."""
     n = len(time) - 2 * sides
     offsets = [k for k in range(-sides, sides + 1) if k]
     apart = {k: time[sides + k : sides + k + n] - time[sides : sides + n] for k in offsets}
@@ -127,7 +127,7 @@ def _deviations(time: Array, value: Array, sides: int, period: float) -> tuple[A
 
 
 def slope_of(time: Array, value: Array, noise: float) -> Array:
-    """Slope (n,) of a signal that is sampled with noise: a straight line through the samples around, as few as its noise allows."""
+    """Slope (n,) of a noisy signal: a straight line through the surrounding samples, as few as the noise allows."""
     slope = np.gradient(value, time)
     for width in WIDTHS:
         if len(time) <= 2 * width:
@@ -141,7 +141,8 @@ def slope_of(time: Array, value: Array, noise: float) -> Array:
 
 
 def _line_slope(time: Array, value: Array, width: int) -> Array:
-    """Slope (n,) of the straight line through each sample and `width` on either side; at the ends, of what is nearest."""
+    """Slope (n,) of the straight line through each sample and `width` on either side; at the ends, the nearest such
+    slope."""
     n = len(time) - 2 * width
     t, v, tt, tv = (np.zeros(n) for _ in range(4))
     for k in range(2 * width + 1):
@@ -154,7 +155,8 @@ def _line_slope(time: Array, value: Array, width: int) -> Array:
 
 
 def _binned(left: Array, square: Array) -> tuple[Array, Array, Array]:
-    """Mean square of the slope, variance of the deviations and number of samples of each bin, (b,) each, the slowest first."""
+    """Mean square of the slope, variance of the deviations and number of samples of each bin, (b,) each, slowest
+    first."""
     order = np.argsort(square, kind="stable")
     speeds, variances, counts = [], [], []
     for own in np.array_split(order, BINS):
@@ -166,8 +168,8 @@ def _binned(left: Array, square: Array) -> tuple[Array, Array, Array]:
 
 
 def _line(speeds: Array, variances: Array, counts: Array) -> tuple[float, float, float] | None:
-    """Level and growth of the variance with the square of the slope, and the growth's standard deviation; None where it does not
-    grow from a level above zero."""
+    """Level and growth of the variance with the square of the slope, and the growth's standard deviation; None
+    where it does not grow from a positive level."""
     if not variances.min() > 0.0:
         return None
     size = max(float(speeds.mean()), 1e-300)

@@ -1,9 +1,11 @@
-"""Standstill: an output that moves by no more than its own rounding or noise, so that nothing of the machine is in it.
+"""Standstill: an output that moves by no more than its rounding or noise, so that it contains no information about
+the machine.
 
-Noise has a short memory, is alike at all times, and goes with nothing that drives the machine. Its memory is that of the
-sensor: drivers average or hold a few samples. The autocorrelation of a motion lasts, however small the motion is beside the noise:
-at a distance it is the share of the variance that the motion has [Box, Jenkins and Reinsel, Time Series Analysis, ch. 2].
-The spread of a correlation of two such signals is Bartlett's (ibid., ch. 12).
+Noise has a short memory, is stationary, and is uncorrelated with the driving signals. Its memory is that of the
+sensor: drivers average or hold a few samples. The autocorrelation of a motion lasts longer, however small the
+motion is relative to the noise. At a large lag it is the motion's share of the variance [Box, Jenkins and Reinsel,
+Time Series Analysis, ch. 2]. The standard deviation of a correlation of two such signals is Bartlett's (ibid., ch.
+12).
 """
 
 import numpy as np
@@ -16,24 +18,26 @@ from rhythmid.record.record import Record
 from rhythmid.record.rounding import resolution
 
 Array = NDArray[np.float64]
-DRIVES = ("input", "effort", "forcing", "reference")  # roles of what drives a machine
-LEAST_SAMPLES = 200  # of fewer an autocorrelation of 0.2 is within what chance makes
-SHARE = 0.2  # of the variance, up to which what lasts is not worth the name of a motion: it is half the size of the noise
-FLICKER = 3  # values in all, up to which the sensor shows its own steps up and down and no motion
-RARELY = 0.01  # share of the samples, up to which a value is an exception, such as a bit that fell over, and tells nothing of a motion
-FEW_STEPS = 16  # of the resolution from end to end, up to which a motion is of the size of the rounding
-AVERAGED = 8  # samples that a driver may average or hold, beyond which memory is the machine's, of a motion of that size
-WHITE = 2  # the same of a larger one, whose memory may be that of a machine that is damped well
-CREST = 8.0  # standard deviations, from which a lone move is an event and no noise
-CHANCE = 1e-3  # with which noise that goes with nothing is taken for driven
+DRIVES = ("input", "effort", "forcing", "reference")  # roles of channels that drive a machine
+LEAST_SAMPLES = 200  # with fewer samples an autocorrelation of 0.2 is within chance
+SHARE = 0.2  # share of the variance up to which a lasting part is no motion: it is half the size of the noise
+FLICKER = 3  # number of distinct values up to which the sensor shows its own resolution and no motion
+# share of the samples up to which a value is an exception, such as a flipped bit, and no motion
+RARELY = 0.01
+FEW_STEPS = 16  # range in steps of the resolution up to which a motion is of the size of the rounding
+# samples that a driver may average or hold; a longer memory is the machine's, for a motion of that size
+AVERAGED = 8
+WHITE = 2  # the same for a larger motion, whose memory may be that of a well-damped machine
+CREST = 8.0  # standard deviations above which a single move is an event and no noise
+CHANCE = 1e-3  # significance level for a correlation of noise with a driving signal
 
 
 def standstill(record: Record, buried: bool = True) -> str | None:
-    """Why the machine of this record is taken to stand still, in one sentence with what to do; None where it moves, or too few
-    samples tell.
+    """Reason why the machine of this record is considered at rest, in one sentence with advice; None where it
+    moves, or where there are too few samples.
 
-    Not `buried`, an output whose noise spans more than the rounding counts as a motion: a small one may lie in it.
-    Outliers look like events: give it a `cleaned` record.
+    With `buried` False, an output whose noise exceeds the rounding counts as a motion, because it may contain a
+    small one. Outliers look like events, so the record should be `cleaned`.
     """
     value = record.output.value
     if np.ptp(value) == 0.0 and is_driven(record):
@@ -58,12 +62,12 @@ def standstill(record: Record, buried: bool = True) -> str | None:
 
 
 def is_driven(record: Record) -> bool:
-    """Whether a force, or a change of what is asked for, drives the machine of a record."""
+    """Whether a force, or a change of the command, drives the machine of a record."""
     return _driver(record) != ""
 
 
 def _driver(record: Record) -> str:
-    """Role of what drives the machine; empty where nothing does."""
+    """Role of the channel that drives the machine; empty where there is none."""
     for role in DRIVES:
         channel = record.channels.get(role)
         if channel is None or not np.isfinite(channel.value).all():
@@ -75,7 +79,7 @@ def _driver(record: Record) -> str:
 
 
 def _held(record: Record) -> str:
-    """What a machine shows that never moves though it is driven: no motion, but what it takes to begin one."""
+    """Message about a driven machine that never moves: no motion, but the force that does not yet start one."""
     role = _driver(record)
     channel = record.channels[role]
     unit = "" if channel.unit == "1" else f" {channel.unit}"
@@ -87,7 +91,7 @@ def _held(record: Record) -> str:
 
 
 def _flicker(levels: Array, count: NDArray[np.int64], record: Record) -> str:
-    """What an output of a few values shows, each of them so often: told by those that are no exception."""
+    """Message about an output with a few values, `count` of each: based on the values that are no exceptions."""
     what, unit = record.output_kind, record.output.unit
     often = count > RARELY * count.sum()
     rare = ", ".join(f"{one:.6g}" for one in levels[~often])
@@ -105,7 +109,7 @@ def _sentence(why: str) -> str:
 
 
 def _noise(value: Array, step: float, memory: int) -> bool:
-    """Whether values (n,) are alike at all times, and remember no more than `memory` samples."""
+    """Whether values (n,) are stationary noise with a memory of at most `memory` samples."""
     away = np.abs(value - np.median(value))
     if away.max() > CREST * max(USUAL * float(np.median(away)), step):
         return False
@@ -113,7 +117,7 @@ def _noise(value: Array, step: float, memory: int) -> bool:
 
 
 def _goes_with_drive(record: Record) -> bool:
-    """Whether the output goes with a channel that drives the machine, more than by chance."""
+    """Whether the output is significantly correlated with a channel that drives the machine."""
     time, value = record.output.time, record.output.value
     own = _correlation(value, value)
     for role, channel in record.channels.items():
@@ -131,7 +135,7 @@ def _goes_with_drive(record: Record) -> bool:
 
 
 def _correlation(first: Array, second: Array) -> Array:
-    """Correlation (n // 2,) of two signals (n,), the second so many samples later."""
+    """Correlation (n // 2,) of two signals (n,) by the lag of the second in samples."""
     n = len(first)
     a, b = (one - one.mean() for one in (first, second))
     found = correlate(b, a, mode="full", method="fft")[n - 1 : n - 1 + n // 2]

@@ -1,4 +1,5 @@
-"""Tables: columns of numbers in .mat, .h5, .npz, .parquet, .json, .csv and other text files, which may be compressed (.csv.gz)."""
+"""Tables: columns of numbers in .mat, .h5, .npz, .parquet, .json, .csv and other text files, also compressed
+(.csv.gz)."""
 
 import math
 import re
@@ -28,21 +29,21 @@ from rhythmid.record.text_table import TEXT, text_table
 
 HDF5 = (".h5", ".hdf5")
 SUFFIXES = (".mat", *HDF5, ".npz", ".npy", ".parquet", *JSON, *TEXT)
-WIDEST = 64  # columns of an array beyond which it is an image or a scan, not joints
+WIDEST = 64  # columns of an array above which it is an image or a scan, not joints
 LABELLED = (
     ("label", "values"),
     ("Name", "Data"),
-)  # fields of a struct: what a channel is called, and its numbers
+)  # fields of a struct: name of a channel, and its numbers
 ONE_OF_MANY = re.compile(r"(.+)\[(\d+)\]")  # dof_pos[3]: one column of an array
 
 
 def table_name(path: Path) -> str:
-    """The name of a table's file without what tells its kind: `run` of `run.csv.gz`."""
+    """The name of a table's file without its suffixes: `run` for `run.csv.gz`."""
     return Path(path.stem).stem if table_suffix(path) != path.suffix.lower() else path.stem
 
 
 def table_suffix(path: Path) -> str:
-    """The suffix that tells what kind of table a file is, in lower case: `.csv` of a compressed `run.csv.gz`, too."""
+    """The suffix for the kind of table, in lower case: `.csv` also for a compressed `run.csv.gz`."""
     suffix = path.suffix.lower()
     if suffix == COMPRESSED and (inner := Path(path.stem).suffix.lower()) in (*JSON, *TEXT):
         return inner
@@ -51,7 +52,7 @@ def table_suffix(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of one file by name, in order, and what a user should know of how it was read, one line each."""
+    """Columns of one file by name, in order, and messages about how it was read, one line each."""
 
     path: Path
     columns: dict[str, Any]
@@ -81,7 +82,7 @@ class Table:
             raise
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-        except Exception as error:  # the readers of damaged .mat and .npz files raise anything
+        except Exception as error:  # the readers may raise any exception on damaged .mat and .npz files
             raise InputError(f"{path}: cannot be read as a table: {' '.join(str(error).split())}") from None
         return cls(
             path,
@@ -93,7 +94,7 @@ class Table:
         )
 
     def vectors(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
-        """Columns of numbers by name, those of arrays one by one."""
+        """Columns of numbers by name; arrays are split into columns."""
         for name, values in self.columns.items():
             array = np.asarray(values)
             if array.dtype.kind not in "fiub":
@@ -106,7 +107,7 @@ class Table:
                 yield str(name), self.column(name)
 
     def words(self) -> Iterator[tuple[str, str]]:
-        """Columns of a text table in which a cell is no number, by name, each with the first such cell."""
+        """Text columns of a text table by name, each with its first cell that is not a number."""
         for name, values in self.columns.items():
             if isinstance(values, np.ndarray) and values.dtype.kind == "O" and values.ndim == 1:
                 word = next((cell for cell in values if isinstance(cell, str) and not _is_number(cell)), None)
@@ -114,8 +115,8 @@ class Table:
                     yield name, word
 
     def column(self, name: str | int) -> NDArray[np.float64]:
-        """One column, float64[n]; `name` may be its number, or `array[3]` for a column of an array of shape [n, columns].
-        Raises InputError when it is not there or no vector."""
+        """One column, float64[n]. `name` may be its index, or `array[3]` for a column of an array of shape [n, columns].
+        Raises InputError when it does not exist or is no vector."""
         names = list(self.columns)
         if isinstance(name, int) and str(name) not in self.columns:
             if not 0 <= name < len(names):
@@ -158,8 +159,8 @@ class Table:
 
 
 def _upright(values: Any) -> Any:
-    """An array as columns, also where it lies across, as Simulink's To File writes it: a row each signal, more values in it than any array
-    has columns."""
+    """An array as columns, also if it is transposed, as from Simulink's To File: one row per signal, with more
+    values than any array has columns."""
     across = (
         isinstance(values, np.ndarray) and values.ndim == 2 and 1 < len(values) <= WIDEST < values.shape[1]
     )
@@ -184,7 +185,7 @@ def _mat(path: Path) -> dict[str, Any]:
         with warnings.catch_warnings():
             warnings.simplefilter(
                 "ignore", MatReadWarning
-            )  # it reads several objects as one variable without a name
+            )  # it reads several objects as one unnamed variable
             found = loadmat(path, simplify_cells=True)
         opaque = [value for value in found.values() if isinstance(value, MatlabOpaque)]
         objects = {_first(one["s0"]): _first(one["s2"]) for one in opaque}  # names and classes
@@ -206,7 +207,7 @@ def _first(texts: NDArray[Any]) -> str:
 
 
 def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Arrays in structs within structs, by the path to them, as MATLAB writes it: `data.q`, `runs[0].q` in a struct array."""
+    """Arrays in nested structs by path, in MATLAB's notation: `data.q`, `runs[0].q` in a struct array."""
     struct = _with_label(struct)
     for name, value in struct.items():
         if isinstance(value, dict):
@@ -224,7 +225,8 @@ def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _with_label(struct: dict[str, Any]) -> dict[str, Any]:
-    """A struct whose numbers are called by the label that stands beside them: Simulink's `label` of `values`, dSPACE's `Name` of `Data`."""
+    """A struct whose numbers are named by the label beside them: Simulink's `label` of `values`, dSPACE's `Name` of
+    `Data`."""
     for label, numbers in LABELLED:
         name = struct.get(label)
         if isinstance(name, str) and name.strip() and numbers in struct and name not in struct:
@@ -233,12 +235,13 @@ def _with_label(struct: dict[str, Any]) -> dict[str, Any]:
 
 
 def _is_cell(value: Any) -> bool:
-    """Whether it is a cell of MATLAB that holds arrays."""
+    """Whether it is a MATLAB cell that holds arrays."""
     return isinstance(value, np.ndarray) and value.dtype.hasobject and any(np.ndim(one) for one in value.flat)
 
 
 def _rows_of_cells(cells: NDArray[Any]) -> NDArray[Any] | None:
-    """A row of numbers for each cell, where there are more cells than an array has columns, and in each as few values as one has."""
+    """One row of numbers per cell, if there are more cells than an array has columns, and each has as few values as
+    a row."""
     shapes = {np.shape(one) for one in cells} if len(cells) > WIDEST else set()
     if len(shapes) != 1 or not 0 < math.prod(shapes.pop()) <= WIDEST:
         return None
@@ -255,10 +258,10 @@ def _npz(path: Path) -> dict[str, Any]:
 
 
 def _npy(path: Path) -> dict[str, Any]:
-    """The columns of an array by their numbers, those of records by their names."""
+    """The columns of an array by index, or the fields of a record array by name."""
     array = np.array(
         np.load(path, allow_pickle=False, mmap_mode="r")
-    )  # which refuses what claims to be longer than its file
+    )  # it rejects a file that claims to be longer than it is
     if array.dtype.names:
         return {name: array[name] for name in array.dtype.names}
     array = _upright(array)
@@ -290,7 +293,7 @@ def _parquet(path: Path) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, column in zip(table.column_names, table.columns):
         values = column.to_numpy()
-        if values.dtype.kind in "mM":  # times: seconds
+        if values.dtype.kind in "mM":  # times, converted to seconds
             values = (
                 values.astype("datetime64[ns]" if values.dtype.kind == "M" else "timedelta64[ns]").astype(
                     np.int64
@@ -298,6 +301,6 @@ def _parquet(path: Path) -> dict[str, Any]:
                 * 1e-9
             )
         if values.dtype.kind == "O" and len(values) and isinstance(values[0], np.ndarray):
-            values = np.stack(list(values))  # one list of numbers a row
+            values = np.stack(list(values))  # one list of numbers per row
         found[name] = values
     return found

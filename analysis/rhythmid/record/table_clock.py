@@ -1,4 +1,4 @@
-"""Which column of a table holds the times, and how many seconds one of its units is."""
+"""Selects the column of a table that holds the times, and its unit in seconds."""
 
 import re
 from collections.abc import Sequence
@@ -20,53 +20,52 @@ TIME = re.compile(
 )
 IN_BRACKETS = re.compile(
     r"(?<=\w)\s*(?:\([^()]*\)|\[[^\[\]]*[^\[\]\d][^\[\]]*\])\s*$"
-)  # a unit; [3] is a place in an array
+)  # a unit; [3] is an array index
 KIND_OF_TIME = re.compile(r".*_(?:time|timestamp|stamp|clock)", re.IGNORECASE)  # pi_time, cpu_time
 COUNTER = re.compile(
     r"|index|idx|i|n|k|id|no|nr|frame|sample|step|row|count|counter|seq|unnamed: 0", re.IGNORECASE
 )
-USUAL_STEP_DEVIATION = (
-    0.5  # of the median step of an unnamed column: a step that differs by no more is a usual one
-)
-USUAL = 0.95  # share of usual steps from which such a column is taken for the time; the others are gaps, and may be as long as they like
-MOST_NAMED = 12  # columns that a complaint lists
-FORWARD = 0.99  # share of steps of a time that go forward
-# the longest sample period [s] that is thought of: a time without a unit whose steps are longer is in ms, µs or ns
+USUAL_STEP_DEVIATION = 0.5  # share of the median step of an unnamed column within which a step is usual
+USUAL = 0.95  # least share of usual steps for a time column; the other steps are gaps of any length
+MOST_NAMED = 12  # largest number of columns in a message
+FORWARD = 0.99  # least share of forward steps of a time
+# [s] largest plausible sample period: a time without a unit and with longer steps is in ms, µs or ns
 LONGEST_STEP = 0.5
-# days since 1900 of the years 2000 to 2100: what counts from there in steps of no more than a second is a spreadsheet's time
+# days since 1900 in the years 2000 to 2100: values in this range with steps of at most a second are a spreadsheet's time
 SERIAL_DAYS = (36526.0, 73051.0)
-NANOSECOND = 1e-9  # s, the smallest unit in which times are written
-MOSTLY_FORWARD = 0.9  # the same of a time that begins anew with each of several recordings
+NANOSECOND = 1e-9  # [s] smallest unit in which times are written
+MOSTLY_FORWARD = 0.9  # the same for a time that restarts with each of several recordings
 
 
 def is_time(name: str, value: Array) -> bool:
-    """Whether a column is called a time, or a kind of time, and goes forward as one."""
+    """Whether a column is named as a time, or a kind of time, and increases."""
     return is_called_time(name) and _forward(value)
 
 
 def is_further_time(name: str, value: Array) -> bool:
-    """Whether a column beside the clock is a time, too: not what is counted in seconds only and mostly stands still, as a pulse's width."""
+    """Whether a column beside the clock is a time, too; not one in seconds that mostly stands still, such as a
+    pulse width."""
     held = TIME.fullmatch(_called(name)) is None and KIND_OF_TIME.fullmatch(_called(name)) is None
     return is_time(name, value) and not (held and _is_coarse(value))
 
 
 def is_called_time(name: str) -> bool:
-    """Whether a column is called a time, or a kind of time."""
+    """Whether a column is named as a time, or a kind of time."""
     return _is_plain_time(name) or KIND_OF_TIME.fullmatch(_called(name)) is not None
 
 
 def _is_plain_time(name: str) -> bool:
-    """Whether a column is called a time and nothing else, or its unit is one of time."""
+    """Whether a column's name means time and nothing else, or its unit is a time unit."""
     return TIME.fullmatch(_called(name)) is not None or heading_of(name).unit == "s"
 
 
 def _is_coarse(value: Array) -> bool:
-    """Whether a time stands still from most rows to the next, as whole seconds do."""
+    """Whether a time is equal in most consecutive rows, as whole seconds are."""
     return float(np.mean(np.diff(value) == 0.0)) > 0.5 if len(value) > 1 else False
 
 
 def _called(name: str) -> str:
-    """The last part of a name, without brackets, whatever stands in them."""
+    """The last part of a name, without brackets and their content."""
     return re.split(r"[./]", IN_BRACKETS.sub("", heading_of(name).name))[-1].replace(" ", "_")
 
 
@@ -78,7 +77,7 @@ def _forward(value: Array) -> bool:
 
 
 def _begins_anew(value: Array) -> bool:
-    """Whether a time goes forward but for some steps, as that of recordings one below the other does."""
+    """Whether a time increases except for some steps, as in concatenated recordings."""
     step = np.diff(value)
     return bool(
         np.isfinite(value).all() and (step < 0.0).any() and float(np.mean(step >= 0.0)) >= MOSTLY_FORWARD
@@ -86,7 +85,7 @@ def _begins_anew(value: Array) -> bool:
 
 
 def is_even(value: Array) -> bool:
-    """Whether a column goes forward by steps that are mostly of one size, as a time does that has gaps, too."""
+    """Whether a column increases by steps of mostly one size, as a time with gaps does."""
     if not _forward(value):
         return False
     step = np.diff(value)
@@ -96,14 +95,15 @@ def is_even(value: Array) -> bool:
 
 
 def has_time(columns: Sequence[tuple[str, Array]]) -> bool:
-    """Whether one of the columns of numbers is taken for the time."""
+    """Whether one of the numeric columns is taken as the time."""
     return any(is_time(name, value) for name, value in columns) or any(
         _is_untold_time(*one) for one in columns
     )
 
 
 def _is_untold_time(name: str, value: Array) -> bool:
-    """Whether a column that is not called a time is one by its steps; whole numbers that count the rows only where it has no name."""
+    """Whether a column that is not named as a time is one by its steps; a column of row numbers only if it has no
+    name."""
     untold = COUNTER.fullmatch(name) is None and not heading_of(name).unit
     return untold and is_even(value) and (name.isdigit() or not bool((np.diff(value) == 1.0).all()))
 
@@ -111,7 +111,8 @@ def _is_untold_time(name: str, value: Array) -> bool:
 def table_clock(
     path: Path, columns: list[tuple[str, Array]], unequal: list[tuple[str, Array]]
 ) -> tuple[Clock, str]:
-    """The column that holds the time. Raises InputError where there is none among those of equal length; `unequal` are the others."""
+    """The column that holds the time. Raises InputError where there is none among those of equal length; `unequal`
+    are the others."""
     for name, value in sorted(
         columns, key=lambda column: (not _is_plain_time(column[0]), _is_coarse(column[1]))
     ):
@@ -146,7 +147,7 @@ def table_clock(
 
 
 def named_clock(name: str, value: Array) -> tuple[Clock, str]:
-    """The clock that a column is which is called a time and goes forward, and why."""
+    """The clock from a column that is named as a time and increases, and the reason for the choice."""
     heading = heading_of(name)
     scale, why = heading.scale, f"its heading says {heading.written}" if heading.unit else ""
     if not why:
@@ -155,7 +156,7 @@ def named_clock(name: str, value: Array) -> tuple[Clock, str]:
 
 
 def _guessed_scale(value: Array) -> tuple[float, str]:
-    """Seconds in one unit of a time whose unit is not told, by the size of its steps."""
+    """Seconds per unit of a time without a stated unit, from the size of its steps."""
     step = float(np.median(np.diff(value)))
     if SERIAL_DAYS[0] <= value[0] <= SERIAL_DAYS[1] and step <= 1.2 / DAY:
         return (

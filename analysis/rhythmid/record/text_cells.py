@@ -1,4 +1,4 @@
-"""Lines of a text table taken apart into cells, and cells into numbers."""
+"""Splits lines of a text table into cells, and converts cells to numbers."""
 
 import csv
 import re
@@ -6,12 +6,12 @@ import re
 import numpy as np
 
 COMMENTS = ("#", "%")
-EMPTY = " \t\r\n;,\"'\0"  # what a line of empty cells is made of, and what a file ends with whose writer lost its power
-# what programs write in place of a number that is missing
+EMPTY = " \t\r\n;,\"'\0"  # characters of a line of empty cells, and the end of a file whose writer lost power
+# notations for a missing number
 MISSING = frozenset(
     "nan n/a na #n/a null none undefined - -- --- -nan -nan(ind) nan(ind) 1.#qnan -1.#ind #num! #div/0!".split()
 )
-INFINITE = {"∞": np.inf, "+∞": np.inf, "-∞": -np.inf}  # beyond its range, as an oscilloscope writes it
+INFINITE = {"∞": np.inf, "+∞": np.inf, "-∞": -np.inf}  # out of range, as an oscilloscope writes it
 HEXADECIMAL = re.compile(r"0[xX][0-9a-fA-F]+")  # of a register or a counter
 THOUSANDS = re.compile(
     r"[+-]?\d{1,3}(?:,\d{3})+\.\d+"
@@ -19,18 +19,18 @@ THOUSANDS = re.compile(
 
 
 def content(line: str) -> bool:
-    """Whether a line is anything but a comment or empty cells, of which spreadsheets leave thousands below a table."""
+    """Whether a line has content other than a comment or empty cells, which spreadsheets append by the thousand."""
     return bool(line.strip(EMPTY)) and line.lstrip()[0] not in COMMENTS
 
 
 def own(line: str, separator: str | None) -> str:
-    """A line without what a spreadsheet has appended that took it for one cell: the commas of empty cells."""
+    """A line without the commas of empty cells that a spreadsheet has appended after taking the line for one cell."""
     line = line.strip(" \r\n")
     return line if separator == "," else line.rstrip(",")
 
 
 def cells_of(line: str, separator: str | None) -> list[str]:
-    """Cells of a line, without quotes and the spaces around them."""
+    """Cells of a line, without quotes and surrounding spaces."""
     if separator is None:
         return next(csv.reader([" ".join(line.split())], delimiter=" ", skipinitialspace=True), [])
     row = next(csv.reader([own(line, separator)], delimiter=separator, skipinitialspace=True), [])
@@ -38,7 +38,8 @@ def cells_of(line: str, separator: str | None) -> list[str]:
 
 
 def number_of(cell: str, decimal: str) -> float | None:
-    """A cell's value, None where it is no number; NaN where it is empty or says that it is missing, so that a complaint can name where."""
+    """A cell's value; None where it is no number. An empty cell or one marked as missing gives NaN, so that a
+    message can give its position."""
     cell = cell.strip().strip("\"'").replace("−", "-")
     if is_missing(cell):
         return np.nan
@@ -55,12 +56,12 @@ def number_of(cell: str, decimal: str) -> float | None:
 
 
 def is_missing(cell: str) -> bool:
-    """Whether a cell is empty, or holds what stands for a number that is missing."""
+    """Whether a cell is empty or marked as missing."""
     cell = cell.strip().strip("\"'")
     return not cell or cell.lower() in MISSING
 
 
 def is_number(cell: str, decimal: str) -> bool:
-    """Whether a cell holds a number, not nothing and no word for a missing one."""
+    """Whether a cell holds a number, and is neither empty nor marked as missing."""
     found = number_of(cell, decimal)
     return found is not None and (found == found or cell.strip().strip("\"'").lower() == "nan")

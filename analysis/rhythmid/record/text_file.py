@@ -1,4 +1,4 @@
-"""Text files as they lie on a disk: their encoding, and compression."""
+"""Encoding and compression of text files."""
 
 import gzip
 from pathlib import Path
@@ -8,12 +8,12 @@ from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
 
 COMPRESSED = ".gz"
-SAMPLE = 1 << 16  # bytes from which the encoding is told
+SAMPLE = 1 << 16  # bytes used to detect the encoding
 BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 
 
 def opened(path: Path) -> TextIO:
-    """A text file, which may be compressed, ready to be read. Raises InputError where it holds more than a table could."""
+    """A text file, possibly compressed, opened for reading. Raises InputError where it is larger than a table can be."""
     packed = path.suffix.lower() == COMPRESSED
     if packed:
         _check_size(path)
@@ -24,7 +24,7 @@ def opened(path: Path) -> TextIO:
 
 
 def _encoding(path: Path, packed: bool) -> str:
-    """UTF-8 or UTF-16 by its mark, else UTF-8 where the beginning is, else Windows' own."""
+    """UTF-8 or UTF-16 by byte-order mark, else UTF-8 if the beginning is valid UTF-8, else the Windows encoding."""
     with gzip.open(path) if packed else path.open("rb") as file:
         start = file.read(SAMPLE)
     for mark, encoding in BYTE_ORDER_MARKS.items():
@@ -38,7 +38,7 @@ def _encoding(path: Path, packed: bool) -> str:
 
 
 def _check_size(path: Path) -> None:
-    """Raise InputError where a compressed table holds more than a table could."""
+    """Raise InputError where a compressed table is larger than a table can be."""
     most = largest(path.stat().st_size)
     size = 0
     with gzip.open(path) as file:

@@ -1,22 +1,22 @@
-"""The head of a text table: which of the lines above its rows holds the names, and which the units."""
+"""The head of a text table: finds the lines with names and units above the rows."""
 
 from collections.abc import Sequence
 
 from rhythmid.record.heading import bare_unit, is_unit
 
-MOSTLY = 0.5  # share of the filled cells of a line that are known units, from which it is one of units
-PURE = ("", "-", "1")  # units of pure numbers
+MOSTLY = 0.5  # share of a line's filled cells with known units above which it is a line of units
+PURE = ("", "-", "1")  # units of dimensionless numbers
 TYPES = frozenset(
     "double single float float32 float64 real int int8 int16 int32 int64 uint8 uint16 uint32 integer long number numeric bool boolean "
     "string str text char datetime timestamp duration".split()
-)  # of a line that says how the columns are stored
+)  # of a line that states how the columns are stored
 
 
 def names_of(above: Sequence[Sequence[str]], count: int) -> list[str] | None:
     """Names of `count` columns from the cells of the lines above the first row, with units where a line holds them.
 
-    The units stand below the names, or above them. None where there is no line above; where none has as many cells as the rows,
-    the last one as it is, so that a complaint can name it.
+    The units may be below or above the names. None where there is no line above. If no line has as many cells as
+    the rows, the last one is returned unchanged, so that a message can quote it.
     """
     if not above:
         return None
@@ -37,7 +37,8 @@ def names_of(above: Sequence[Sequence[str]], count: int) -> list[str] | None:
 
 
 def _told_by(names: Sequence[str], above: Sequence[Sequence[str]]) -> list[str]:
-    """Names, of which those that are empty or stand twice are told by the lines above, the nearest first: `Rotation.X`, `Position.X`."""
+    """Names in which empty or duplicate ones are completed by the lines above, the nearest first: `Rotation.X`,
+    `Position.X`."""
     found = list(names)
     for line in above:
         unclear = [not name or found.count(name) > 1 for name in found]
@@ -49,7 +50,8 @@ def _told_by(names: Sequence[str], above: Sequence[Sequence[str]]) -> list[str]:
 
 
 def is_units(cells: Sequence[str]) -> bool:
-    """Whether a line holds units: most of its cells do, or all stand in brackets; or no cell is anything else, as below names without units."""
+    """Whether a line holds units: most cells do, or all are in brackets, or no cell is anything else, as below
+    names without units."""
     filled = [cell for cell in cells if cell.strip()]
     if all(cell.strip()[0] in "[({" and cell.strip()[-1] in "])}" for cell in filled):
         return True
@@ -59,11 +61,11 @@ def is_units(cells: Sequence[str]) -> bool:
 
 
 def is_types(cells: Sequence[str]) -> bool:
-    """Whether a line says how the columns are stored."""
+    """Whether a line states how the columns are stored."""
     return all(cell.strip().lower() in TYPES for cell in cells)
 
 
 def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
-    """Names with their units in brackets, but for those of pure numbers."""
+    """Names with their units in brackets, except for dimensionless ones."""
     pairs = zip(names, map(bare_unit, units), strict=True)
     return [name if unit in PURE else f"{name} [{unit}]" for name, unit in pairs]

@@ -1,4 +1,4 @@
-"""The rows of a text table: the lines that belong to it, and their numbers."""
+"""The rows of a text table: finds their lines and converts them to numbers."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -9,13 +9,13 @@ import numpy as np
 
 from rhythmid.record.text_cells import cells_of, content, number_of, own
 
-REMARK = re.compile(r"\s#.*")  # behind a row; a # within a cell is none, as in 1.#QNAN
-SHOWN = 40  # characters of a line that a complaint quotes
+REMARK = re.compile(r"\s#.*")  # after a row; a # within a cell, as in 1.#QNAN, is no remark
+SHOWN = 40  # characters of a line quoted in a message
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """The lines that hold rows, and their numbers in the file, counted from 1."""
+    """The lines that hold rows, and their line numbers in the file, counted from 1."""
 
     texts: list[str]
     numbers: list[int]
@@ -24,7 +24,7 @@ class Rows:
         return len(self.texts)
 
     def complaint(self, place: int, why: str) -> ValueError:
-        """What is wrong with a row, and what to do."""
+        """Message about a wrong row, with advice."""
         text = self.texts[place]
         shown = text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
         return ValueError(
@@ -33,10 +33,12 @@ class Rows:
 
 
 def rows_in(lines: Iterable[str], first: int, separator: str | None, head: Sequence[str]) -> Rows:
-    """The lines that hold rows; `first` is the number of the first, counted from 0, and `head` the cells of the line above it.
+    """The lines that hold rows; `first` is the line number of the first, counted from 0, and `head` the cells of
+    the line above it.
 
-    A head that stands there again, as where a logger was started anew, is none. Nor is a last line that breaks off, without an end and
-    with fewer cells, as where a logger was switched off. Raises ValueError where a line has another number of cells than the first.
+    A repeated head, as after a restart of the logger, is no row. Neither is an incomplete last line, without a line
+    end and with fewer cells, as after the logger was switched off. Raises ValueError where a line has another
+    number of cells than the first.
     """
     found = Rows([], [])
     last, begin = "", head[0] if head else ""
@@ -54,14 +56,14 @@ def rows_in(lines: Iterable[str], first: int, separator: str | None, head: Seque
     if len(found) > 1 and last[-1:] not in "\n\r" and len(cells_of(found.texts[-1], separator)) < usual:
         found.texts.pop()
         found.numbers.pop()
-    for place, text in enumerate(found.texts):  # loadtxt itself looks at no column but those that are used
+    for place, text in enumerate(found.texts):  # loadtxt itself checks only the columns that are used
         if text.count(separator) + 1 != usual and '"' not in text:
             raise found.complaint(place, f"has {text.count(separator) + 1} cells, the first row has {usual}")
     return found
 
 
 def numbers_of(rows: Rows, separator: str | None, decimal: str, columns: Sequence[int]) -> np.ndarray:
-    """Numbers [rows, columns]; the slow way with Python's own conversion only where cells are empty or have decimal commas.
+    """Numbers [rows, columns]. Python's own, slow conversion is used only where cells are empty or have decimal commas.
 
     Raises ValueError where a cell is no number.
     """
@@ -82,7 +84,7 @@ def numbers_of(rows: Rows, separator: str | None, decimal: str, columns: Sequenc
         try:
             return read(None)
         except ValueError:
-            pass  # an empty cell, say
+            pass  # for example an empty cell
     try:
         return read(value)
     except ValueError:
@@ -90,7 +92,7 @@ def numbers_of(rows: Rows, separator: str | None, decimal: str, columns: Sequenc
 
 
 def _first_wrong(rows: Rows, separator: str | None, decimal: str, columns: Sequence[int]) -> ValueError:
-    """A complaint about the first row that is none."""
+    """Message about the first line that is no row."""
     usual = len(cells_of(rows.texts[0], separator))
     for row, text in enumerate(rows.texts):
         cells = cells_of(text, separator)

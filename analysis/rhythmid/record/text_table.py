@@ -1,7 +1,7 @@
-"""Text tables as programs write them: comment lines, a title, names and units above the numbers; commas, semicolons, tabs or
-spaces between the columns; decimal points or commas; cells in quotes.
+"""Text tables of other programs: comment lines, a title, names and units above the numbers; commas, semicolons,
+tabs or spaces between the columns; decimal points or commas; cells in quotes.
 
-Nothing has to be said of a file: the separator is the one by which most lines are rows of numbers of one length.
+The format need not be declared: the separator is the one with which most lines are rows of numbers of equal length.
 """
 
 import re
@@ -29,25 +29,25 @@ from rhythmid.record.text_head import names_of
 from rhythmid.record.text_rows import Rows, numbers_of, rows_in
 
 TEXT = (".csv", ".tsv", ".txt", ".dat", ".lvm", ".log")
-SEPARATORS = ("\t", ";", ",", None)  # None: any number of spaces; in this order where two do equally well
-LOOKED_AT = 200  # lines from which the dialect is told: more than any head has
-UNIT_OR_END = re.compile(r"(\s*[\[({<][^\[({<]*)?$")  # of a column's name
-ACROSS = 10  # times as many columns as rows, from which the lines of a table without names are its columns
+SEPARATORS = ("\t", ";", ",", None)  # None: any number of spaces; in this order of preference
+LOOKED_AT = 200  # lines used to detect the dialect: more than any head has
+UNIT_OR_END = re.compile(r"(\s*[\[({<][^\[({<]*)?$")  # end of a column's name
+ACROSS = 10  # ratio of columns to rows above which the lines of a table without names are its columns
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a text table is written.
+    """Notation of a text table.
 
     Attributes
     ----------
     separator : between columns; None stands for any number of spaces.
     decimal : "." or ",".
-    first : number of the line, counted from 0, that holds the first row of numbers; the number of lines where none does.
-    names : of the columns, with their units where the file tells them.
-    numeric : positions of the columns that hold numbers.
+    first : number of the line, counted from 0, with the first row of numbers; the number of lines where there is none.
+    names : of the columns, with their units where the file states them.
+    numeric : indices of the columns that hold numbers.
     head : cells of the line above the rows.
-    notes : what a user should know of the names, one line each.
+    notes : messages about the names, one line each.
     """
 
     separator: str | None
@@ -65,10 +65,12 @@ def read_text(path: Path) -> dict[str, Any]:
 
 
 def text_table(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Columns of a text table by name: float64[n] each, float64[n, k] where cells are lists, dates and times of day in seconds, text[n]
-    where a column holds words; and what a user should know of the file, one line each.
+    """Columns of a text table by name, and messages about the file, one line each.
 
-    Raises InputError where the file is empty or its names do not belong to the rows; ValueError where a row is damaged.
+    A column is float64[n], float64[n, k] where cells are lists, or text[n] where it holds words. Dates and times of
+    day are in seconds.
+
+    Raises InputError where the file is empty or its names do not match the rows; ValueError where a row is damaged.
     """
     with opened(path) as file:
         begin = list(islice(unbroken(file), LOOKED_AT))
@@ -105,7 +107,7 @@ def text_table(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
 
 
 def dialect_of(lines: list[str], name: str) -> Dialect:
-    """The dialect of a table that begins with these lines. Raises InputError; `name` stands for the file."""
+    """The dialect of a table that starts with these lines. Raises InputError; `name` is the file's name in messages."""
     lvm = lvm_head(lines)
     if lvm is not None:
         lines = ["" if number < lvm.lines else line for number, line in enumerate(lines)]
@@ -113,7 +115,7 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
     if not used:
         raise InputError(f"{name}: is empty")
     separator, decimal, rows, _ = max(_readings([line for _, line in used]), key=lambda one: one[3])
-    if not any(rows):  # no numbers: names alone
+    if not any(rows):  # no numbers, only names
         separator = max(SEPARATORS, key=lambda one: len(cells_of(used[-1][1], one)))
         head = cells_of(used[-1][1], separator)
         return Dialect(separator, decimal, len(lines), tuple(head), tuple(range(len(head))))
@@ -152,7 +154,7 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
 
 
 def _told_apart(head: list[str], line: int) -> tuple[list[str], tuple[str, ...]]:
-    """Names of columns of which each stands once: further ones are numbered before their unit, as pandas does, with a note on each name."""
+    """Distinct names of columns: repeated names are numbered before their unit, as in pandas, with a note on each."""
     found: list[str] = []
     notes: list[str] = []
     for name in head:
@@ -169,13 +171,14 @@ def _told_apart(head: list[str], line: int) -> tuple[list[str], tuple[str, ...]]
 
 
 def _first_told(rows: list[list[str]], place: int) -> str:
-    """The first cell of a column that is not missing; empty where all are."""
+    """The first cell of a column that is not missing; empty where all are missing."""
     return next((row[place] for row in rows if len(row) > place and not is_missing(row[place])), "")
 
 
 def _readings(lines: list[str]) -> Iterator[tuple[str | None, str, list[int], tuple[int, int, int]]]:
-    """Separator, decimal mark, of each line how many numbers it holds where it is a row, else 0, and how well the reading does: numbers
-    that are told apart in rows, the number of rows, and the cells that are seen to be empty."""
+    """Possible readings of the lines: separator, decimal mark, the count of numbers in each line (0 where it is no
+    row), and a score. The score is the count of numbers that are separated in rows, the number of rows, and the
+    count of cells recognised as empty."""
     for separator in SEPARATORS:
         split = [cells_of(line, separator) for line in lines]
         for decimal in (".",) if separator == "," and not any('"' in line for line in lines) else (".", ","):
@@ -188,7 +191,7 @@ def _readings(lines: list[str]) -> Iterator[tuple[str | None, str, list[int], tu
 
 
 def _count(cell: str, decimal: str) -> int:
-    """How many numbers a cell holds, of which a list has several; [1] may be a unit."""
+    """Count of numbers in a cell, several for a list; [1] may be a unit."""
     if is_number(cell, decimal) or is_measured(cell, decimal):
         return 1
     found = list_of(cell) or ()
@@ -198,8 +201,8 @@ def _count(cell: str, decimal: str) -> int:
 def _names_above(above: list[list[str]], last: str, count: int) -> list[list[str]]:
     """The lines above the first row, without those that cannot name its `count` columns.
 
-    The last of them may have another separator than the rows. It is a title where it is one cell by any, and the beginning of a row
-    that was lost where it holds numbers only.
+    The last of them may have another separator than the rows. It is a title if it is one cell with every separator.
+    It is the rest of a lost row if it holds only numbers.
     """
     if not above or len(above[-1]) == count:
         return above
@@ -213,7 +216,8 @@ def _names_above(above: list[list[str]], last: str, count: int) -> list[list[str
 
 
 def _unnamed(before: list[str], separator: str | None, rows: list[list[str]]) -> list[str]:
-    """Names of columns in a comment before the rows, else their numbers; a separator behind every row makes no column."""
+    """Names of columns from a comment before the rows, else their indices; a separator at the end of every row
+    makes no column."""
     count = len(rows[0])
     ended = not any(row[-1] for row in rows if len(row) == count)
     filled = count - 1 if ended and count > 1 else count
@@ -225,7 +229,7 @@ def _unnamed(before: list[str], separator: str | None, rows: list[list[str]]) ->
 
 
 def _remark(lines: list[str], separator: str | None, count: int) -> list[str] | None:
-    """Names, and units, in the last comment lines that have as many entries as there are columns."""
+    """Names, and units, in the last comment lines with as many entries as there are columns."""
     remarks = [line.strip() for line in lines if line.lstrip()[:1] in COMMENTS]
     told = [cells_of(line.lstrip("#% "), separator) for line in remarks if line.lstrip("#% ")]
     while told and len(told[-1]) != count:
@@ -234,9 +238,9 @@ def _remark(lines: list[str], separator: str | None, count: int) -> list[str] | 
 
 
 def _first_row(rows: list[list[str]], numbers: list[int], decimal: str) -> int:
-    """Which line is the first of numbers: not one of a title or of units that holds a number, too.
+    """Index of the first line of numbers, skipping a title or line of units that also holds a number.
 
-    Such a line begins with a word where most rows have a number, and has no more numbers than words.
+    Such a line begins with a word where most rows have a number, and has at most as many numbers as words.
     """
     begin = next(place for place, count in enumerate(numbers) if count)
     usual = Counter(count for count in numbers if count).most_common(1)[0][0]
@@ -249,7 +253,7 @@ def _first_row(rows: list[list[str]], numbers: list[int], decimal: str) -> int:
 
 
 def _begins_with_word(row: list[str], below: list[list[str]], decimal: str) -> bool:
-    """Whether the first cell that is filled is no number where most of the rows below have one."""
+    """Whether the first filled cell is no number where most of the rows below have one."""
     place = next((place for place, cell in enumerate(row) if cell), 0)
     if number_of(row[place], decimal) is not None:
         return False
@@ -258,8 +262,9 @@ def _begins_with_word(row: list[str], below: list[list[str]], decimal: str) -> b
 
 
 def _words(cells: list[str], rows: Rows, place: int) -> np.ndarray:
-    """A column of lists or of seconds where its cells are lists or times, of words else."""
+    """A text column; lists where its cells are lists, seconds where they are times."""
     found = lists_of(cells, rows, place)
     if found is None:
         found = seconds(cells)
-    return np.array(cells, dtype=object) if found is None else found  # fixed-width text would take much more
+    # fixed-width text would need much more memory
+    return np.array(cells, dtype=object) if found is None else found

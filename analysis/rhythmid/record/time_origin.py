@@ -1,16 +1,16 @@
-"""Where the time of a record begins: where its clock does if that started with the run, else at the first sample.
+"""Origin of a record's time: the zero of its clock if the clock started with the run, else the first sample.
 
-What changes with the time of a run, such as an actuator that fades, begins there; a clock that has run for an hour before says nothing of it.
+Effects that depend on the time of a run, such as an actuator that fades, start there. A clock that was running for
+an hour before does not show that time.
 """
 
 from dataclasses import replace
 
 from rhythmid.record.record import Record
 
-RUN_CLOCK = 10.0  # seconds; a clock that reads less at the first sample started with the run
-CALENDAR = (
-    1e8  # seconds, three years: a clock that reads more counts from 1970, not from the start of a machine
-)
+RUN_CLOCK = 10.0  # [s]; a clock with a smaller first time started with the run
+# [s], three years: a clock with a larger time counts from 1970, not from the start of a machine
+CALENDAR = 1e8
 
 
 def origin_of(first: float) -> float:
@@ -19,8 +19,8 @@ def origin_of(first: float) -> float:
 
 
 def counted_from(record: Record, origin: float) -> Record:
-    """The record with its times counted from an origin [s]. A forcing that is known by formula has its phase in the time as it is,
-    so that a record with one is left alone."""
+    """The record with its times relative to an origin [s]. The phase of a forcing formula refers to the unshifted
+    time, so a record with such a formula is unchanged."""
     if origin == 0.0 or record.forcing_law is not None:
         return record
     moved = {role: replace(one, time=one.time - origin) for role, one in record.channels.items()}

@@ -1,4 +1,4 @@
-"""Times of samples: order, duplicates, nominal period, gaps, jitter."""
+"""Timing of samples: order, duplicates, nominal period, gaps, jitter."""
 
 import math
 from dataclasses import dataclass
@@ -9,39 +9,41 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.record.irregular_stamps import COMMON, PAUSE, irregular, too_short, usual_range
 
-GAP = 1.5  # periods between two samples, beyond which at least one is missing
-LATE = 10.0  # periods by which a message may arrive late and still be put back in order
-DISORDERED = 0.01  # share of stamps that may be earlier than the one before them by jitter
-SAME = 1e-9  # seconds; times that differ by less are one
-OFTEN = 0.1  # share of steps longer than 1.5 periods, beyond which a channel is not periodic
-# samples on either side, beyond twice as many as may be missing, whose stamps tell whether any is
+GAP = 1.5  # periods between two samples above which at least one is missing
+LATE = 10.0  # periods by which a message may be late and still be sorted into place
+DISORDERED = 0.01  # share of stamps that may be earlier than the previous one because of jitter
+SAME = 1e-9  # [s]; times that differ by less are equal
+OFTEN = 0.1  # share of steps longer than 1.5 periods above which a channel is not periodic
+# samples on either side, beyond twice the possible number of missing ones, whose stamps show whether any is missing
 NEIGHBOURS = 25
-# steps over which the period is read off in turn, up to about NEIGHBOURS, over which it must not drift
+# numbers of steps over which the period is estimated in turn, up to about NEIGHBOURS, over which it must not drift
 SPANS = (1, 2, 4, 8, 16, 32)
-BURSTS = 0.5  # of the usual span's mean step, below which the usual step is one within a burst of messages that were held back
-FULL = 0.5  # of the periods missing, by which the earliest sample after a gap is late,
-JUDGED = 500  # long steps at most, by which it is judged whether the stamps are irregular: as many tell, and more take time
-AT_AN_END = 0.95  # and where so few samples are left that all of them may have come late by jitter
+# ratio to the usual span's mean step below which the usual step lies within a burst of delayed messages
+BURSTS = 0.5
+FULL = 0.5  # least delay of the earliest sample after a gap, as a share of the missing periods
+# largest number of long steps used to detect irregular stamps: more steps take time without changing the result
+JUDGED = 500
+AT_AN_END = 0.95  # the same near an end, where so few samples remain that all may be late because of jitter
 
 Times = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Timing:
-    """What the times of a channel or topic look like.
+    """Timing of a channel or topic.
 
     Attributes
     ----------
     count : number of samples, duplicates included.
     start, end : first and last time [s].
     period : nominal time between samples [s]; 0 where there are fewer than two.
-    jitter_std : standard deviation of the time between neighbours [s], gaps left out.
-    gaps, lost : number of gaps (see `gaps_between`) and of samples that are missing in them.
+    jitter_std : standard deviation of the time between neighbours [s], without gaps.
+    gaps, lost : number of gaps (see `gaps_between`) and of samples missing in them.
     longest_gap : [s]; 0 without gaps.
     duplicates : samples with the time of another.
-    late : samples that were recorded after one with a later time.
-    usual_range : shortest and longest usual step [s] of irregular stamps, whose `period` is the mean step; None where the stamps are
-        those of a period, however they jitter and whatever is missing. See `irregular_stamps`.
+    late : samples recorded after one with a later time.
+    usual_range : shortest and longest usual step [s] of irregular stamps, whose `period` is the mean step; None for
+        periodic stamps, whatever their jitter and gaps. See `irregular_stamps`.
     """
 
     count: int
@@ -63,7 +65,7 @@ class Timing:
 
     @property
     def told_rate(self) -> str:
-        """The rate in words; of irregular stamps the mean one, with their usual steps."""
+        """The rate in words; for irregular stamps the mean rate, with their usual steps."""
         if self.usual_range is None:
             return f"{self.rate:.4g} Hz"
         shortest, longest = (1e3 * step for step in self.usual_range)
@@ -85,7 +87,7 @@ class Timing:
         period, pause = _sampling(step)
         first, missing = _gaps(np.concatenate([[0.0], np.cumsum(step)]), period, pause)
         regular = np.delete(step, first)
-        # late samples look like gaps, but nothing is missing then over the whole
+        # late samples look like gaps, but over the whole nothing is missing
         lost = min(int(missing.sum()), max(0, round((end - start) / period) - len(step)))
         return cls(
             len(time), start, end, period,
@@ -96,11 +98,12 @@ class Timing:
 
 
 def gaps_between(time: Times) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Gaps in increasing times (n,): of each the sample before it, and how many samples are missing; (g,) and (g,).
+    """Gaps in increasing times (n,): for each the sample before it (g,), and the number of missing samples (g,).
 
-    A step of more than 1.5 periods that the steps around it make up for is jitter of the stamps or a burst of messages that were
-    held up, and none: nothing comes early, so that after a real gap even the earliest of the next samples is late. Among irregular
-    stamps only a pause is a gap. A channel in which long steps are common, such as a command that is sent when it changes, has none.
+    A step of more than 1.5 periods that the surrounding steps compensate is stamp jitter or a burst of delayed
+    messages, and no gap. No message is early, so after a real gap even the earliest of the next samples is late.
+    Among irregular stamps only a pause is a gap. A channel in which long steps are common, such as a command that
+    is sent when it changes, has no gaps.
     """
     step = np.diff(time)
     period, pause = _sampling(step) if len(step) > 1 else (0.0, None)
@@ -111,8 +114,8 @@ def gaps_between(time: Times) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def _gaps(time: Times, period: float, pause: float | None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Gaps in increasing times (n,) as `gaps_between` gives them: of what is sampled once in a `period` [s], or irregularly, steps
-    beyond a `pause` [s]."""
+    """Gaps in increasing times (n,) as in `gaps_between`: for periodic sampling with `period` [s]; for irregular
+    sampling, steps longer than `pause` [s]."""
     step = np.diff(time)
     wide = np.flatnonzero(step > (GAP * period if pause is None else pause))
     lost = np.maximum(np.rint(step[wide] / period - 1.0).astype(np.int64), 1)
@@ -125,7 +128,8 @@ def _gaps(time: Times, period: float, pause: float | None) -> tuple[NDArray[np.i
 def _not_made_up_for(
     time: Times, period: float, wide: NDArray[np.int64], lost: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """Whether the stamps around `wide` steps (w,), in which so many samples seem `lost`, do not make up for them."""
+    """Whether the stamps around `wide` steps (w,), with `lost` (w,) apparently missing samples, do not compensate
+    them."""
     late = time - period * np.arange(len(time))
     real = np.zeros(len(wide), dtype=bool)
     for index, (before, count) in enumerate(zip(wide, 2 * lost + NEIGHBOURS, strict=True)):
@@ -136,19 +140,21 @@ def _not_made_up_for(
 
 
 def nominal_period(step: Times) -> float:
-    """Nominal period from the positive times between samples [s]: the usual step, or of irregular stamps the mean one.
+    """Nominal period from the positive times between samples [s]: the usual step, or the mean one of irregular stamps.
 
-    The median, refined over 1, 2, 4, ... steps by the mean of those spans that lie within half a period of so many periods: what
-    jitter and rounding do to a period falls with the length of the span, and spans in which a sample is missing are left out.
-    Where messages were held back and came in bursts, it is the mean step of the usual span instead.
+    It is the median, refined over 1, 2, 4, ... steps by the mean of those spans that are within half a period of
+    that many periods. The effect of jitter and rounding on the period falls with the length of the span; spans with
+    a missing sample are left out. Where delayed messages arrived in bursts, it is the mean step of the usual span
+    instead.
 
-    Rounded to whole nanoseconds, the resolution of stamps; not where the steps are even and the rounding would lead away from them.
+    It is rounded to whole nanoseconds, the resolution of stamps, unless the steps are even and rounding would move
+    it away from them.
     """
     return _sampling(step)[0]
 
 
 def _sampling(step: Times) -> tuple[float, float | None]:
-    """Nominal period [s] of steps (n,); and of irregular stamps the step [s] beyond which one is a pause, else None."""
+    """Nominal period [s] of steps (n,); and for irregular stamps the step [s] above which one is a pause, else None."""
     period, bursts = _usual_step(step)
     if bursts or not (too_short(step, period) or irregular(step, period, _long_steps(step, period))):
         return period, None
@@ -157,7 +163,7 @@ def _sampling(step: Times) -> tuple[float, float | None]:
 
 
 def _long_steps(step: Times, period: float) -> Times:
-    """Steps (g,) that are gaps if these are the steps (n,) of a period, or as many of them as tell; none where they are rare."""
+    """Steps (g,) that would be gaps of a periodic channel, limited to a sufficient number; empty where they are rare."""
     wide = np.flatnonzero(step > GAP * period)
     if len(wide) <= COMMON * len(step):
         return np.empty(0)
@@ -171,7 +177,7 @@ def _usual_step(step: Times) -> tuple[float, bool]:
     """The period of steps (n,), and whether they come in bursts."""
     period = float(
         np.percentile(step, 50.0, method="lower")
-    )  # a step that occurs, where steps are of two kinds
+    )  # an existing step, where there are two kinds of steps
     time = np.concatenate([[0.0], np.cumsum(step)])
     longest = max(count for count in SPANS if count <= len(step))
     usual = float(np.median(time[longest:] - time[:-longest])) / longest
@@ -192,11 +198,12 @@ def _usual_step(step: Times) -> tuple[float, bool]:
 
 
 def put_in_order(time: Times, label: str, mend: str) -> NDArray[np.int64]:
-    """Indices that put samples in order of time; of samples with one time, only the first is kept.
+    """Indices that sort samples by time; of samples with equal times only the first is kept.
 
-    Messages may overtake one another on their way to the recorder. Such a message is put back where it belongs: it is
-    at most 10 periods late and fills a hole, so that no two samples come closer than half a period. Stamps that jitter may change
-    places with their neighbours now and then. Any other step backwards means that the clock was set back, and then the recording cannot be trusted.
+    Messages may overtake one another on their way to the recorder. Such a message is sorted into place if it is at
+    most 10 periods late and fills a hole, so that no two samples are closer than half a period. Jittering stamps
+    may occasionally be exchanged with their neighbours. Any other step backwards means that the clock was set back;
+    then the recording is rejected.
 
     Raises InputError, beginning with `label` and ending with `mend`, when time goes backwards or stands still.
     """
@@ -211,7 +218,7 @@ def put_in_order(time: Times, label: str, mend: str) -> NDArray[np.int64]:
     step = np.diff(time[kept])
     period = nominal_period(step)
     if (newest[late] - time[late]).max() < period and len(late) < DISORDERED * len(time):
-        return kept  # no clock but its jitter
+        return kept  # no fault of the clock except its jitter
     moved = np.flatnonzero(np.isin(kept, late))
     near = np.concatenate([step[moved[moved > 0] - 1], step[moved[moved < len(step)]]])
     fills = len(moved) == len(late) and (near >= 0.5 * period).all()

@@ -1,4 +1,4 @@
-"""The rate of a table that has no time, as a single number in it tells: a simulation's `dt`, a recorder's `fs`."""
+"""The rate of a table without a time column, from a single number in it: a simulation's `dt`, a recorder's `fs`."""
 
 import re
 from collections.abc import Sequence
@@ -19,7 +19,8 @@ RATE = re.compile(
 
 
 def told_rate(table: Table, columns: Sequence[tuple[str, NDArray[np.float64]]]) -> tuple[float, str] | None:
-    """The rate of the rows [Hz] and why; None where a column tells the time, or no single number is called a step or a rate."""
+    """The rate of the rows [Hz] with the reason; None where a column is the time, or no single number is named as a
+    step or a rate."""
     if has_time(columns):
         return None
     for name, values in table.columns.items():

@@ -1,21 +1,20 @@
-"""How wrong a command may be where it was not recorded: what moves the machine by less than the noise of the measurement."""
+"""Tolerable error of a command where it was not recorded: its effect on the motion is below the measurement noise."""
 
 import numpy as np
 
 from rhythmid.record.interpolation import interpolation_errors
 from rhythmid.record.record import Channel
 
-EXACT = (
-    1e-4  # of the motion, below which an error of the command counts for nothing however small the noise is
-)
+# share of the motion below which an error of the command is negligible, however small the noise is
+EXACT = 1e-4
 
 
-@np.errstate(over="ignore", invalid="ignore")  # of numbers near the largest
+@np.errstate(over="ignore", invalid="ignore")  # for numbers near the largest
 def tolerable_error(output: Channel) -> float:
-    """Error of a command, as a share of its size times its duration [s], that moves the machine by less than the noise.
+    """Error of a command, as a share of its size times its duration [s], whose effect on the motion is below the noise.
 
-    An impulse J changes the speed by J/m. A command of size U moves a mass at the speed w of its motion by about U/(m w²), so
-    that the share e of U during T moves it by the share e w T.
+    An impulse J changes the speed by J/m. A command of size U moves a mass by about U/(m w²), with w the angular
+    frequency of its motion. So an error e U during a time T changes the motion by the share e w T.
     """
     value, span = output.value - output.value.mean(), output.time[-1] - output.time[0]
     size = float(np.std(value))

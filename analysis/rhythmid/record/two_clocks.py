@@ -1,4 +1,4 @@
-"""Two clocks of one table: a time that was counted, a fixed step a row, and one that was read, which tell the same rows different times."""
+"""Two clocks in one table that disagree: a counted time with a fixed step per row, and a measured time."""
 
 import re
 from collections.abc import Sequence
@@ -13,20 +13,21 @@ from rhythmid.record.table import SUFFIXES, Table, table_suffix
 from rhythmid.record.table_clock import is_further_time, named_clock
 
 Array = NDArray[np.float64]
-SKEW = 1e-3  # by which clocks of one computer may run apart: quartz does by 1e-4, and clocks that a network sets by some more
-COUNTED = 1e-6  # of a step, that steps of a counted time may differ by beyond the rounding of its numbers
-ROUNDING = 4.0  # units in the last place of the largest time, that a difference of two may be off
+# largest skew of clocks of one computer: quartz clocks differ by 1e-4, clocks set by a network by somewhat more
+SKEW = 1e-3
+COUNTED = 1e-6  # relative difference of steps of a counted time beyond the rounding of its numbers
+ROUNDING = 4.0  # units in the last place of the largest time by which a difference of two may be off
 OF_WORK = re.compile(
     r"(?:^|_)(?:cpu|process|user|sys)(?:_|$)", re.IGNORECASE
 )  # of a computer: no time of the rows
 SIMULATED = re.compile(
     r"(?:^|_)sim", re.IGNORECASE
-)  # a counted time that is the motion's own, however long it took
-STEPS = 2.0  # of the longest step of either clock, that their spans may differ by at their ends
+)  # a counted time that is the motion's own, however long the run took
+STEPS = 2.0  # longest steps of either clock by which their spans may differ at their ends
 
 
 def is_counted(time: Array) -> bool:
-    """Whether all steps of a time are one number, as of rows that are counted."""
+    """Whether all steps of a time are equal, as for counted rows."""
     step = np.diff(time)
     usual = float(np.median(step))
     rounding = ROUNDING * float(np.spacing(np.abs(time).max()))
@@ -34,7 +35,7 @@ def is_counted(time: Array) -> bool:
 
 
 def disagreeing(columns: Sequence[tuple[str, Array]], name: str, time: Array) -> list[tuple[str, Array]]:
-    """Other columns that are called times and tell another duration of these rows, with their times [s]."""
+    """Other columns that are named as times but give another duration of these rows, with their times [s]."""
     found: list[tuple[str, Array]] = []
     for other, value in columns:
         if (
@@ -53,7 +54,7 @@ def disagreeing(columns: Sequence[tuple[str, Array]], name: str, time: Array) ->
 
 
 def trusted_clock(columns: Sequence[tuple[str, Array]], clock: Clock, reason: str) -> tuple[Clock, str]:
-    """The clock that was taken and why, or one that was read, where that one is counted and they disagree."""
+    """The chosen clock with the reason, or a measured one where the chosen one is counted and they disagree."""
     name, values = str(clock.column), dict(columns)
     time = values[name] * clock.scale
     if not is_counted(time) or SIMULATED.search(name):
@@ -66,7 +67,7 @@ def trusted_clock(columns: Sequence[tuple[str, Array]], clock: Clock, reason: st
 
 
 def clock_notes(columns: Sequence[tuple[str, Array]], name: str, time: Array) -> tuple[str, ...]:
-    """A line on every clock that disagrees with the one that is taken, and why that is."""
+    """A line on every clock that disagrees with the chosen one, with the likely reason."""
     counted = is_counted(time)
     return tuple(
         f"the table has two clocks that disagree: {name}, which is taken, has {1e3 * _step(time):.4g} ms a row, {other} "
@@ -88,7 +89,7 @@ def _why(counted: bool, other_counted: bool) -> str:
 
 
 def read_clock_notes(source: Path, signals: Signals) -> list[str]:
-    """The same of the tables that a signals.yaml names, or of the table `source` whose columns it names."""
+    """Clock notes for the tables that a signals.yaml names, or for the table `source` whose columns it names."""
     name = signals.time.column
     if signals.time.kind != "column":
         return []
@@ -98,7 +99,7 @@ def read_clock_notes(source: Path, signals: Signals) -> list[str]:
         table = Table.load(file)
         try:
             chosen = table.column(name)
-        except InputError:  # the channels of this file have a time of their own
+        except InputError:  # the channels of this file have their own time
             continue
         if len(chosen) > 1 and np.isfinite(chosen).all():
             found += clock_notes(list(table.vectors()), str(name), chosen * signals.time.scale)

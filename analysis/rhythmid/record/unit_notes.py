@@ -1,11 +1,11 @@
-"""Units that the headings of a table tell and its signals.yaml does not heed."""
+"""Units in the headings of a table that its signals.yaml ignores."""
 
 from rhythmid.record.heading import heading_of
 from rhythmid.record.signals import Signals
 
 
 def unit_notes(signals: Signals) -> tuple[str, ...]:
-    """A note on every column whose heading tells a unit that is not SI and that is read without a scale."""
+    """A note on every column whose heading has a unit that is not SI and that is read without a scale."""
     read: list[tuple[str, str | int, float]] = [
         (role, source.column, source.scale) for role, source in signals.channels.items()
     ]

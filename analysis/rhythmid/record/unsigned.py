@@ -1,8 +1,8 @@
-"""An unsigned effort: a current or a load of which only the size was recorded, as many motor drivers give it.
+"""Detects an unsigned effort: a current or load of which only the magnitude was recorded, as many motor drivers do.
 
-It never changes its sign though the motion reverses. So does one that holds a weight; but that one goes with the direction of the
-motion, as friction does, and with its place and acceleration, and so does what pushes only, where it does; an unsigned one goes with
-their sizes.
+It never changes its sign although the motion reverses. An effort that holds a weight does not, either, but it is
+correlated with the direction of the motion (friction), with position and acceleration. So is, where it acts, an
+effort that can only push. An unsigned effort is correlated with the magnitudes of these.
 """
 
 import numpy as np
@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-EACH_WAY = 0.1  # of the time, that the motion goes each way at least
-SLOW = 0.1  # of its largest speed (the 95 % quantile), below which it goes no way
-LEAST_SAMPLES = 100  # for the laws, of five terms each, to be told apart
-LEAST_SHARE_TOLD = 0.2  # of the effort's variance, that the sizes tell at least
-BETTER_LAW_SHARE = 0.8  # of what the signed law leaves of it, up to which the law of sizes is the better one
-ROUNDS = 10  # of signs and laws in turn [Fienup, Applied Optics 21 (1982) 2758, of the phases of a signal]; few change after
-AVERAGED = 2  # samples on either side, of which a motion that is read coarsely has its speed
+EACH_WAY = 0.1  # least share of the time in either direction of motion
+SLOW = 0.1  # share of the largest speed (95 % quantile) below which a motion has no direction
+LEAST_SAMPLES = 100  # to distinguish the laws, of five terms each
+LEAST_SHARE_TOLD = 0.2  # least share of the effort's variance that the law of magnitudes explains
+# ratio of residuals to those of the signed law below which the law of magnitudes is better
+BETTER_LAW_SHARE = 0.8
+# iterations of signs and laws in turn [Fienup, Applied Optics 21 (1982) 2758, for the phases of a signal]; few
+# signs change after
+ROUNDS = 10
+AVERAGED = 2  # samples on either side averaged for the speed of a coarsely read motion
 WHY = (
     "it is no effort as it was recorded: it never changes its sign though the motion reverses, and goes with the sizes of speed and "
     "acceleration, not with their directions; record it with its sign"
@@ -25,7 +28,7 @@ WHY = (
 
 
 def unsigned_notes(record: Record) -> list[str]:
-    """A line on each effort of a record that has lost its sign."""
+    """A line on each effort of a record that was recorded without its sign."""
     if record.output_kind != "position":
         return []
     output, found = record.output, list[str]()
@@ -68,12 +71,12 @@ def _mean(value: Array) -> Array:
 
 
 def _law(terms: Array, effort: Array) -> Array:
-    """What a law of these terms (n, m) makes of the effort (n,)."""
+    """Least-squares fit (n,) of a law with these terms (n, m) to the effort (n,)."""
     return terms @ np.linalg.lstsq(terms, effort, rcond=None)[0]
 
 
 def _size_of_law(terms: Array, size: Array, sign: Array) -> Array:
-    """The size (n,) of a law of these terms (n, m): the signs are those that the law has, from a first guess on."""
+    """Magnitude (n,) of a law with these terms (n, m); the signs are iterated from a first guess to those of the law."""
     law = size
     for _ in range(ROUNDS):
         law = _law(terms, sign * size)
@@ -82,7 +85,7 @@ def _size_of_law(terms: Array, size: Array, sign: Array) -> Array:
 
 
 def _one_sided(terms: Array, size: Array) -> Array:
-    """What a law of these terms (n, m) makes of a force (n,) that can push only, as a contact or a rope does."""
+    """Fit (n,) of a law with these terms (n, m) to a force (n,) that can only push, as of a contact or a rope."""
     law = size
     for _ in range(ROUNDS):
         pushing = law > 0.0
@@ -93,5 +96,5 @@ def _one_sided(terms: Array, size: Array) -> Array:
 
 
 def _left(effort: Array, law: Array) -> float:
-    """Share of an effort's variance that a law leaves."""
+    """Share of an effort's variance that a law leaves unexplained."""
     return float(np.mean((effort - law) ** 2) / np.var(effort))

@@ -1,7 +1,7 @@
-"""A command that nobody renews ends: it is held for a while, then fades to zero.
+"""A command that is not renewed ends: it is held for a while, then fades to zero.
 
-The rule is the same in the plant node, in a run without ROS and in the last node before a robot. It knows no clock: time
-is whole nanoseconds of whatever clock the commands are stamped with.
+The rule is the same in the plant node, in a run without ROS and in the last node before a robot. It is independent
+of the clock: time is whole nanoseconds of the clock that stamps the commands.
 """
 
 import math
@@ -15,7 +15,7 @@ TIMEOUT = 0.1
 RAMP = 0.02
 """Default length of the ramp to zero [s]: short beside `TIMEOUT`, long beside the reaction time of a drive."""
 
-_RENEWALS = 2  # sample periods for which a command is held at least: with fewer a punctual sender could lapse
+_RENEWALS = 2  # least sample periods for which a command is held: with fewer, a punctual sender could lapse
 
 
 class CommandHold:
@@ -23,14 +23,14 @@ class CommandHold:
 
     Parameters
     ----------
-    timeout : seconds for which a command is held that is not renewed; at least two sample periods; 0: for ever.
-    ramp : seconds from then on in which it fades to zero, in steps of a sample period.
+    timeout : [s] time for which a command is held without renewal; at least two sample periods; 0: for ever.
+    ramp : [s] time in which it then fades to zero, in steps of a sample period.
     period_ns : sample period [ns] of the commands.
 
     Attributes
     ----------
-    effort : the effort now in force [N], as of the last call.
-    lapses : how often a command other than zero was not renewed in time.
+    effort : the effort in force [N] after the last call.
+    lapses : number of nonzero commands that were not renewed in time.
     """
 
     def __init__(self, timeout: float, ramp: float, period_ns: int) -> None:
@@ -41,14 +41,14 @@ class CommandHold:
         self._period_ns = period_ns
         self._renewed_ns = 0
         self._given = 0.0
-        self._step = 0  # of the ramp, the next one
+        self._step = 0  # index of the next step of the ramp
 
     def renew(self, stamp_ns: int, effort: float) -> None:
         """A command [N] that holds from `stamp_ns` on."""
         self._renewed_ns, self._given, self.effort, self._step = stamp_ns, effort, effort, 0
 
     def until(self, stamp_ns: int) -> list[tuple[int, float]]:
-        """The steps of the ramp up to `stamp_ns` that have not been told yet: (stamp [ns], effort [N])."""
+        """The steps of the ramp up to `stamp_ns` that have not been returned yet: (stamp [ns], effort [N])."""
         steps: list[tuple[int, float]] = []
         if self._given == 0.0 or stamp_ns - self._renewed_ns < self._timeout_ns:
             return steps
@@ -64,7 +64,7 @@ class CommandHold:
     def fill(
         self, stamp_ns: NDArray[np.int64], effort: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Commands with increasing stamps, shapes (n,), and between them the steps down where they pause too long."""
+        """Commands with increasing stamps, shapes (n,), with the steps of the ramp added where they pause too long."""
         if len(stamp_ns) == 0:
             return stamp_ns, effort
         stamps: list[int] = []

@@ -1,6 +1,6 @@
-"""Compile a model's structure, once for all models that differ in values only.
+"""Compiles a model's structure, once for all models that differ only in parameter values.
 
-`generated_source` writes the module; `machine_code` compiles it, or knows it from before.
+`generated_source` writes the module; `machine_code` compiles it or loads it from the cache.
 """
 
 from collections.abc import Callable, Hashable
@@ -20,11 +20,12 @@ from rhythmid.simulation.machine_code import Module, load_run
 class Compiled:
     """A compiled structure.
 
-    `run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out)` integrates from times[0], where the state is
-    `start`, and fills a row of `out` for each time; it returns how many rows are finite. Knots and cubic pieces belong
-    to the command (ku, cu), the forcing (kw, cw) and, where compiled with `disturbed`, to a further force on the mass
-    (kd, cd). `resume` takes one more argument, what is known of the past, none of it in `NO_HISTORY`, and returns with the rows what
-    the next run needs of it to go on where this one ends. The global interpreter lock is released meanwhile.
+    `run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out)` integrates from times[0], where the state
+    is `start`, and fills a row of `out` for each time; it returns the number of finite rows. Knots and cubic pieces
+    belong to the command (ku, cu), the forcing (kw, cw) and, where compiled with `disturbed`, to a further force on
+    the mass (kd, cd). `resume` takes one more argument, the history of signals (`NO_HISTORY` for none), and returns
+    with the rows the history that the next run needs to continue. The global interpreter lock is released
+    meanwhile.
     """
 
     layout: Layout
@@ -33,7 +34,7 @@ class Compiled:
 
 
 NO_HISTORY = np.empty((0, 0))
-USUAL = Variant()  # driven by a force, its position measured
+USUAL = Variant()  # force input, position output
 
 
 def _of(module: Module, layout: Layout) -> Compiled:
@@ -49,7 +50,8 @@ def _of(module: Module, layout: Layout) -> Compiled:
 
 
 def _key(terms: tuple[Term, ...]) -> Hashable:
-    """Equal for terms that compile to the same code, whatever their values; a kernel's code compares by content."""
+    """Equal for terms that compile to the same code, whatever their values; kernels are compared by the content of
+    their code."""
     return tuple(
         (
             term.label, term.element.name, term.element.slot, term.element.acts, term.element.family,
@@ -69,7 +71,7 @@ def _structure(key: Hashable, terms: "_Terms", variant: Variant) -> Compiled:
 
 @dataclass(frozen=True, eq=False)
 class _Terms:
-    """Terms that take no part in the cache's key: models that differ in values share one compiled function."""
+    """Terms that are not part of the cache's key: models that differ in values share one compiled function."""
 
     terms: tuple[Term, ...]
 
@@ -81,7 +83,7 @@ class _Terms:
 
 
 def compile_model(model: Model, variant: Variant = USUAL) -> Compiled:
-    """The compiled structure of a model; parameter values play no part."""
+    """The compiled structure of a model, independent of parameter values."""
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
     return _structure(_key(terms), _Terms(terms), variant)
 
@@ -94,10 +96,10 @@ def _rates(key: Hashable, terms: "_Terms", excited: InputKind) -> Compiled:
 def compile_rates(model: Model, excited: InputKind = "force") -> Compiled:
     """The model's right-hand side at given points, for its linearisation.
 
-    `run(times (n,), command (n,), forcing (n,), states (n, q), parameters, out (n, q + 2))` fills rows of state rates,
-    sensor output and total actuator force. Signals in the command path are taken as they are, without its delays;
-    dead times of elements are states (`rational`). A
-    memory's rate is its change over a step of the length that the parameter `ELAPSED` says.
+    `run(times (n,), command (n,), forcing (n,), states (n, q), parameters, out (n, q + 2))` fills rows of state
+    rates, sensor output and total actuator force. The delays of the command path are ignored; dead times of
+    elements are states (`rational`). The rate of a memory state is its change over a step whose length is the
+    parameter `ELAPSED`.
     """
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
     return _rates(_key(terms), _Terms(terms), excited)

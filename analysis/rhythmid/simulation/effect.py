@@ -1,7 +1,7 @@
-"""What an element would do along a trajectory that is already known: its force, or its change of a signal.
+"""Effect of an element along a known trajectory: its force, or its change of a signal.
 
-The trajectory stays as it is; that is exact to first order in the size of the effect, and enough to tell which of many
-elements deserves to be simulated in earnest. Compiled once an element, whatever the model.
+The trajectory is not changed. That is exact to first order in the size of the effect, which is enough to select the
+elements that need a full simulation. Compiled once per element, for all models.
 """
 
 from collections.abc import Callable, Hashable, Mapping
@@ -19,16 +19,19 @@ from rhythmid.simulation.kernel_source import kernel_module
 from rhythmid.simulation.machine_code import Module, load_run
 
 Array = NDArray[np.float64]
-# what the kernel of an element that acts so is given of a path besides the usual
+# further inputs of the kernel by the element's kind of action
 FURTHER = {"transmission": ("load",), "constraint": ("acceleration",)}
-MAX_STEP = 2.5e-4  # [s] for the element's own states; what it remembers takes one step a sample
+MAX_STEP = 2.5e-4  # [s] for the element's own states; memory states take one step per sample
 
 
 @dataclass(frozen=True)
 class Path:
-    """A trajectory: arrays (n,) of time [s], position, velocity, actuator force, leg force, and the signal that enters
-    a command, actuator or sensor element. `load` is the load that a gear carries besides the actuator force; where it is
-    not given, the model's own forces along the path make it up. Where no `acceleration` is given, the velocity tells it."""
+    """A trajectory: arrays (n,) of time [s], position, velocity, actuator force, leg force, and the input signal of
+    a command, actuator or sensor element.
+
+    `load` is the load of a gear besides the actuator force; where it is not given, it is computed from the model's
+    forces along the path. Where no `acceleration` is given, it is the derivative of the velocity.
+    """
 
     time: Array
     position: Array
@@ -48,7 +51,7 @@ class Path:
 def _module(element: Element) -> Module:
     p = [f"p{i}" for i in range(len(element.parameters) + len(element.borrows))]
     s = [f"s{i}" for i in range(len(element.own))]
-    flowing = len(element.states)  # the first of `s`; the others are remembered
+    flowing = len(element.states)  # the first ones of `s`; the others are memory states
     sources = [
         *(parameter.name for parameter in element.parameters),
         *(source for source, _ in element.borrows.values()),
@@ -132,7 +135,8 @@ def _module(element: Element) -> Module:
 
 @dataclass(frozen=True, eq=False)
 class _Any:
-    """An element that takes no part in the cache's key: those that differ in names and bounds share one compiled function."""
+    """An element that is not part of the cache's key: elements that differ in names and bounds share one compiled
+    function."""
 
     element: Element
 
@@ -149,7 +153,8 @@ def _run(key: Hashable, one: _Any) -> Callable[..., Any]:
 
 
 def _run_of(element: Element) -> Callable[..., Any]:
-    """The compiled function of an element; a kernel's code compares by content, and what it borrows by name."""
+    """The compiled function of an element; kernels are compared by the content of their code, borrowed parameters
+    by name."""
     key = (
         element.name, element.slot, element.acts, element.states, element.memories, tuple(element.borrows.items()),
         tuple(parameter.name for parameter in element.parameters), getattr(element.kernel, "__code__", None),
@@ -163,8 +168,9 @@ def effect_along(
     """Force (n,) that the element adds on the mass along the path; for a command, actuator or sensor element the
     change of its signal.
 
-    An element's own states take steps of at most `max_step` [s]. Parameters that the element borrows come from `model`. Raises InputError when the model lacks one, or when one of the
-    element's own has no value, and for an element that acts on the past, which has to be simulated.
+    An element's own states take steps of at most `max_step` [s]. Parameters that the element borrows come from
+    `model`. Raises InputError when the model lacks one, when one of the element's own has no value, and for an
+    element that depends on the past, which needs a simulation.
     """
     if element.history:
         raise InputError(
@@ -204,8 +210,8 @@ def effect_along(
 
 
 def load_along(model: Model, path: Path) -> Array:
-    """The load (n,) that a gear carries besides the actuator force: that of the path, or else the sum of the model's forces along it
-    that are no losses."""
+    """The load (n,) of a gear besides the actuator force: that of the path, else the sum of the model's forces
+    along it without losses."""
     if path.load is not None:
         return path.load
     total = np.zeros(len(path.time))

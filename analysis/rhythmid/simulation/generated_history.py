@@ -1,31 +1,32 @@
-"""The lines of a generated integration loop that keep the past of signals for elements with a dead time, and look it up.
+"""Generates the lines of an integration loop that store and look up past signals for elements with a dead time.
 
-A model without such elements gets none of them. `history` holds the functions that they call.
+A model without such elements has none of these lines. `history` holds the functions that they call.
 """
 
 from dataclasses import dataclass
 
 from rhythmid.simulation.history import SIGNALS
 
-PADE = 4  # order of the rational approximation of a dead time
-FEWEST_STEPS_OF_DELAY = 4.0  # integration steps that the states of this approximation need
+PADE = 4  # order of the Padé approximation of a dead time
+FEWEST_STEPS_OF_DELAY = 4.0  # least number of integration steps in the dead time of this approximation
 
 
 @dataclass(frozen=True)
 class DelayedSignal:
-    """A signal that an element wants as it was some time ago: the name `delay` of the variable that holds the time in the
-    generated code, and whether the signal `jumps` where the command does."""
+    """A signal that an element needs at an earlier time. `delay` is the variable with the dead time in the
+    generated code; `jumps` says whether the signal jumps where the command does."""
 
     delay: str
     jumps: bool
 
 
 def rational_past(signal: str, delay: str, step: str, first: int) -> tuple[str, list[str]]:
-    """A signal a dead time ago by Padé's approximation [4/4], as an expression, and lines with the rates of its four states.
+    """A delayed signal by Padé's approximation [4/4], as an expression, and lines with the rates of its four states.
 
-    With x = s τ, Q(x) = 1 + x/2 + 3x²/28 + x³/84 + x⁴/1680 and Q(x) w = z, what comes out is Q(−x) w = z − w′ − w‴/42, its
-    error below 4e-8 |x|⁹ (G. H. Golub, C. F. Van Loan, Matrix Computations, 4th ed., 2013, section 9.3.1). A dead time shorter than
-    some steps is a share of one that long, which agrees to first order in frequency. `first` is the place of the first state.
+    With x = s τ, Q(x) = 1 + x/2 + 3x²/28 + x³/84 + x⁴/1680 and Q(x) w = z, the output is Q(−x) w = z − w′ − w‴/42,
+    with an error below 4e-8 |x|⁹ (G. H. Golub, C. F. Van Loan, Matrix Computations, 4th ed., 2013, section 9.3.1).
+    A dead time shorter than a few steps is represented as a share of one that long, which agrees to first order in
+    frequency. `first` is the index of the first state.
     """
     w = [f"s{first + k}" for k in range(PADE)]
     lasting = f"max({delay}, {FEWEST_STEPS_OF_DELAY} * {step})"
@@ -38,34 +39,34 @@ def rational_past(signal: str, delay: str, step: str, first: int) -> tuple[str, 
 
 @dataclass(frozen=True)
 class HistoryLines:
-    """What the loop has to do for these signals. `smooth` as in `generate`: where it is True nothing jumps."""
+    """Lines of the loop for these signals. `smooth` as in `generate`: where it is True, no signal jumps."""
 
     signals: tuple[DelayedSignal, ...]
     smooth: bool
 
     @property
     def _delays(self) -> tuple[DelayedSignal, ...]:
-        """The signals, one for each delay."""
+        """The signals, one per delay."""
         return tuple({one.delay: one for one in self.signals}.values())
 
     @property
     def width(self) -> int:
-        """Columns of the history."""
+        """Number of columns of the history."""
         return SIGNALS + 3 * len(self.signals)
 
     @property
     def given(self) -> list[str]:
-        """Names of what the right-hand side is given more."""
+        """Names of further arguments of the right-hand side."""
         return [name for m in range(len(self.signals)) for name in (f"old{m}", f"share{m}")]
 
     @property
     def returned(self) -> list[str]:
-        """Names of what it returns more."""
+        """Names of its further return values."""
         return [f"now{m}" for m in range(len(self.signals))]
 
     @property
     def present(self) -> list[str]:
-        """Take every signal as it is."""
+        """Use every signal without its delay."""
         return [f"old{m} = 0.0; share{m} = 1.0" for m in range(len(self.signals))]
 
     def _row(self, one: DelayedSignal) -> str:
@@ -73,11 +74,11 @@ class HistoryLines:
 
     @property
     def oldest(self) -> str:
-        """The oldest row that is still needed: for a slope, the one before that which a delay reaches back to."""
+        """The oldest row that is still needed; for a slope, the row before the one to which a delay reaches back."""
         return f"max(min({', '.join([*(self._row(one) for one in self._delays), 'last'])}) - 1, 0)"
 
     def look_up(self, time: str, within: bool = False) -> list[str]:
-        """Find what the signals were at a time; `within` a step that it ends, jumps there are still to come."""
+        """Look up the signals at a time; with `within`, jumps at the end of a step are still to come."""
         found = "row_until" if within else "row_at"
         rows = [
             f"{self._row(one)} = {found}(past, {self._row(one)}, last, {one.delay}, {time})"
@@ -91,12 +92,12 @@ class HistoryLines:
 
     @property
     def begun(self) -> list[str]:
-        """Begin a row where a stretch of steps, or a sample, begins."""
+        """Start a row at the start of a stretch of steps or of a sample."""
         return [f"began(past, last, t, {'False' if self.smooth else 'ku[i] == t'})"] if self.signals else []
 
     @property
     def stops(self) -> list[str]:
-        """End the stretch where a jump comes through a delay."""
+        """End the stretch where a delayed jump arrives."""
         jumping = [] if self.smooth else [one for one in self._delays if one.jumps]
         return [
             line
@@ -108,7 +109,7 @@ class HistoryLines:
         ]
 
     def keep(self, stage: int) -> list[str]:
-        """Keep the signals of a stage: begin, the mean of the two estimates of the middle, end."""
+        """Store the signals of a stage: start, mean of the two estimates of the middle, end."""
         lines = ["past[last, 1] = h"] if self.signals and stage == 1 else []
         for m in range(len(self.signals)):
             place = SIGNALS + 3 * m
@@ -126,7 +127,7 @@ class HistoryLines:
 
     @property
     def next_row(self) -> list[str]:
-        """Go on to the next row, with room for it; rows that no delay reaches back to are dropped there."""
+        """Advance to the next row, with room for it; rows that no delay reaches are dropped there."""
         if not self.signals:
             return []
         return [
@@ -142,7 +143,8 @@ class HistoryLines:
     def before_the_start(
         self, states: int, memories: list[int], find: list[str], inputs: dict[str, list[str]], call: str
     ) -> list[str]:
-        """The past of a run that is given none: command and forcing are known, the states are led back along their rates.
+        """The past of a run without a given history: command and forcing are known; the states are extrapolated
+        back along their rates.
 
         `call` evaluates the right-hand side at the states `z0`, `z1`, … and the time `at`.
         """

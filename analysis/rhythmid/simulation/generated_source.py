@@ -1,10 +1,10 @@
-"""The equations of a model as source text: element kernels composed into one Runge-Kutta loop.
+"""The equations of a model as source text: element kernels combined in one Runge-Kutta loop.
 
 The classical fourth-order Runge-Kutta method (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential
-Equations I, section II.1) with a fixed largest step. A step never crosses a sample time or a jump of the command, so
-its order holds for held commands; where a damper switches, the force is continuous and only its slope jumps, which
-costs a local error of second order in a step too short to matter (tested against an adaptive reference). What elements
-remember changes at the two ends of a step, the second of which takes one more evaluation.
+Equations I, section II.1) with a fixed largest step. A step never crosses a sample time or a jump of the command,
+so its order holds for held commands. Where a damper switches, the force is continuous and only its slope jumps.
+This causes a local error of second order, in a step too short to matter (tested against an adaptive reference).
+Memory states change at the two ends of a step; the second end takes one more evaluation.
 """
 
 from dataclasses import dataclass
@@ -27,11 +27,12 @@ DRIVES: tuple[InputKind, ...] = ("force", "reference")  # inputs that go through
 
 @dataclass(frozen=True)
 class Layout:
-    """Where everything stands in the compiled function's arrays.
+    """Positions in the compiled function's arrays.
 
-    `parameters[i]` is the model parameter at index i of the parameter vector, with its value when the model lacks it;
-    `states` names the state vector: position, velocity, then the elements' own states and memories; `memories` are the
-    places of the latter; `history` is the width of what is kept of the past, 0 where nothing is. An output row holds the states, then the sensor's output, then the total actuator force.
+    `parameters[i]` is the model parameter at index i of the parameter vector, with its value when the model lacks
+    it. `states` names the state vector: position, velocity, then the elements' own states and memory states;
+    `memories` are the indices of the latter. `history` is the width of the stored past, 0 where none is stored. An
+    output row holds the states, the sensor's output, and the total actuator force.
     """
 
     parameters: tuple[tuple[str, float | None], ...]
@@ -87,7 +88,7 @@ class _Writer:
         self.lines.append(f"{targets} = {element.name}({', '.join([*arguments, *values, *states, *past])})")
 
     def _past(self, term: Term, name: str, value: str) -> str:
-        """What a signal was before the term's dead time: what the loop says, and its share of the present."""
+        """A signal before the term's dead time: the value from the loop, and the share of the present value."""
         delay = self._parameter(f"{term.label}.{term.element.dead_time}")
         if self.rational:
             first = len(self.states)
@@ -103,13 +104,14 @@ class _Writer:
 
 @dataclass(frozen=True)
 class Variant:
-    """What decides the code besides the terms.
+    """Properties besides the terms that determine the code.
 
-    `excited` says what the command is: a force on the mass; the reference of a controller in the command path; the
-    displacement of the base that the leg stands on; or the base's acceleration, where position and velocity are
-    relative to the base. `measured` is what the sensor sees; an acceleration is the mass's own, whatever the base does.
-    Steps end at the command's knots, where a held command jumps, unless it is `smooth`. With `disturbed` the code takes a further,
-    arbitrary force on the mass as a signal. With `rational` dead times are approximated by states, see `rational_past`.
+    `excited` is the kind of the command: a force on the mass; the reference of a controller in the command path;
+    the displacement of the base on which the leg stands; or the base's acceleration, where position and velocity
+    are relative to the base. `measured` is the quantity of the sensor; an acceleration is absolute, whatever the
+    base does. Steps end at the command's knots, where a held command jumps, unless it is `smooth`. With `disturbed`
+    the code takes a further, arbitrary force on the mass as a signal. With `rational` dead times are approximated
+    by states, see `rational_past`.
     """
 
     excited: InputKind = "force"
@@ -139,7 +141,7 @@ def _right_hand_side(terms: tuple[Term, ...], variant: Variant) -> _Writer:
     command = [term for term in command if term.element.acts != "observation"]
     for term in sorted(
         command, key=lambda term: term.element.acts == "feedback"
-    ):  # the controller gets what is left of u
+    ):  # the controller gets the rest of u
         writer.call(term, ["f", *seen, "t"] if term.element.acts == "feedback" else ["f", "t"], "f")
     writer.lines.append("f = f + w")
     for term in (term for term in force if term.element.acts == "drive"):
@@ -181,7 +183,8 @@ def _right_hand_side(terms: tuple[Term, ...], variant: Variant) -> _Writer:
 
 
 def _refuse_constraints(constraints: list[Term], excited: InputKind) -> None:
-    """Raise InputError for constraints whose acceleration is not known: of a base that moves, and of two that share it."""
+    """Raise InputError for constraints with an unknown acceleration: on a moving base, and for two constraints that
+    share it."""
     if len(constraints) > 1:
         raise InputError(
             f"{constraints[0].label!r} and {constraints[1].label!r} both depend on the acceleration that both change; leave out one"
@@ -248,7 +251,8 @@ def generate(terms: tuple[Term, ...], variant: Variant) -> tuple[Module, Layout]
         ]
 
     find = [*([] if smooth else ["i = piece_at(ku, i, t)"]), *following("t")]
-    step = [  # the stages at the half step share their inputs, and so do the end of a step and the next one's begin
+    # the stages at the half step share their inputs, as do the end of a step and the start of the next
+    step = [
         *history.look_up("t"),
         stage(1, "t", "", "0.0"),
         *history.keep(1),

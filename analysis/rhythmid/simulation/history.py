@@ -1,35 +1,36 @@
-"""What signals of a simulation were some time ago, kept step by step for the elements that ask for it.
+"""Past values of signals in a simulation, stored step by step for the elements that need them.
 
-A row a step: its begin [s], its length [s], whether signals may jump where it begins, then for each signal its values at the
-step's begin, middle and end, which a parabola joins. Jumps so stay jumps. The row behind the last whole step belongs to the
-step under way. A delay shorter than what of that step has passed is read off a parabola through the present value, with the
-slope that the signal had as the step began: so the value is smooth in the delay down to zero, where it is the present one.
+There is one row per step: its start [s], its length [s], whether signals may jump at its start, then for each
+signal the values at start, middle and end of the step, which a parabola interpolates. So jumps are preserved. The
+row after the last complete step belongs to the current step. A delay shorter than the elapsed part of that step is
+evaluated on a parabola through the present value, with the signal's slope at the start of the step. So the value is
+continuous in the delay down to zero, where it is the present one.
 
-The text of these functions is compiled once into a module of its own, which generated ones import.
+The text of these functions is compiled once into its own module, which generated modules import.
 """
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
 
 import numpy as np
 
-BEGIN, LENGTH, JUMP, SIGNALS = 0, 1, 2, 3  # columns; three a signal from the last on
+BEGIN, LENGTH, JUMP, SIGNALS = 0, 1, 2, 3  # columns; three per signal from the last on
 
 
 def row_at(past, row, last, delay, time):
-    """Row that `time` - `delay` falls into, or begins, searched from `row` on."""
+    """Row in which `time` - `delay` lies or with which it starts, searched from `row` on."""
     while row < last and past[row + 1, 0] + delay <= time:
         row += 1
     return row
 
 
 def row_until(past, row, last, delay, time):
-    """Row that `time` - `delay` falls into, or ends."""
+    """Row in which `time` - `delay` lies or with which it ends."""
     while row < last and past[row + 1, 0] + delay < time:
         row += 1
     return row
 
 
 def jump_until(past, row, last, delay, until):
-    """When a jump comes through the delay for the first time after `row`, `until` where none does before."""
+    """Time at which the first jump after `row` arrives through the delay; `until` where none is earlier."""
     for k in range(row + 1, last + 1):
         if past[k, 0] + delay >= until:
             break
@@ -39,7 +40,7 @@ def jump_until(past, row, last, delay, until):
 
 
 def earlier(past, row, last, column, at, now):
-    """Value b and share s that make up the signal at time `at`: b + s (z - b), with z the signal at `now`."""
+    """Value b and share s of the signal at time `at`: b + s (z - b), with z the signal at `now`."""
     a = past[row, column]
     if row < last:
         x = (at - past[row, 0]) / past[row, 1]
@@ -56,7 +57,7 @@ def earlier(past, row, last, column, at, now):
 
 
 def began(past, last, time, jumps):
-    """Begin the row `last` at `time`, unless it begins there already; a jump there is not forgotten."""
+    """Start the row `last` at `time`, unless it already starts there; an earlier jump there is kept."""
     if past[last, 0] != time:
         past[last, 0] = time
         past[last, 2] = 0.0
@@ -65,7 +66,7 @@ def began(past, last, time, jumps):
 
 
 def with_room(past, oldest, last):
-    """The rows from `oldest` to `last`, with room for more."""
+    """The rows from `oldest` to `last`, with space for more."""
     kept = last + 1 - oldest
     roomy = np.zeros((max(2 * kept, 64), past.shape[1]))
     roomy[:kept] = past[oldest : last + 1]

@@ -1,6 +1,6 @@
-"""Modules that generated ones import: the kernel of an element, piecewise cubic signals, the past of signals.
+"""Modules that generated modules import: the kernel of an element, piecewise cubic signals, past values of signals.
 
-The text of every function goes, as it stands in its file, into a module that is compiled once for all structures.
+The text of every function is copied from its file into a module that is compiled once for all structures.
 """
 
 import inspect

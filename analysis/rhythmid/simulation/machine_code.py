@@ -1,7 +1,7 @@
-"""Machine code of generated modules, kept on disk.
+"""Cache of the machine code of generated modules on disk.
 
-A module's name is a hash of its text: change an element and a new module is compiled, use the same combination again and
-the machine code comes from disk. A module names those that it imports in its text, so it changes with them.
+A module's name is a hash of its text. A changed element gives a new module; a combination that was used before is
+loaded from disk. A module's text contains the names of the modules that it imports, so it changes with them.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from numba.core.errors import NumbaError
 from rhythmid.errors import InputError
 
 _LOCK = threading.Lock()
-COLOUR = re.compile(r"\x1b\[[0-9;]*m")  # the compiler writes in colours where it can
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")  # the compiler uses colours where it can
 OURS = {
     "rhs",
     "run",
@@ -31,7 +31,7 @@ OURS = {
 
 
 def cache_folder() -> Path:
-    """Where generated modules live: RHYTHMID_CACHE, else XDG_CACHE_HOME/rhythmid, else ~/.cache/rhythmid."""
+    """Folder of generated modules: RHYTHMID_CACHE, else XDG_CACHE_HOME/rhythmid, else ~/.cache/rhythmid."""
     own = os.environ.get("RHYTHMID_CACHE")
     if own:
         return Path(own)
@@ -56,7 +56,7 @@ def load_run(module: Module) -> Callable[..., int]:
 
     Raises InputError where the cache cannot be written, or where an element's kernel does not compile.
     """
-    with _LOCK:  # whoever comes second finds a module that is whole
+    with _LOCK:  # a second process or thread finds a complete module
         for needed in (*module.imports, module):
             if needed.name not in sys.modules:
                 _load(needed)
@@ -64,7 +64,7 @@ def load_run(module: Module) -> Callable[..., int]:
 
 
 def _load(module: Module) -> None:
-    """Write a module's text where it is not there yet, and import it."""
+    """Write a module's text where it does not exist yet, and import it."""
     folder = cache_folder()
     path = folder / f"{module.name}.py"
     if not path.exists():
@@ -93,10 +93,10 @@ def _load(module: Module) -> None:
 
 
 def _put(partial: Path, path: Path) -> None:
-    """Give a whole file its name, unless another process has done so meanwhile.
+    """Give a complete file its final name, unless another process has done so meanwhile.
 
-    A file that is replaced is another one for numba, which would compile it anew and overwrite what it keeps of the first
-    while other processes read it.
+    A replaced file is a different one for numba: it would be compiled again, and the cached code of the first would
+    be overwritten while other processes read it.
     """
     try:
         os.link(partial, path)
@@ -108,7 +108,7 @@ def _put(partial: Path, path: Path) -> None:
 
 
 def _complaint(text: str, complaint: str) -> str:
-    """One line of the compiler's page of complaint, with the elements that it mentions."""
+    """One line from the compiler's long error message, with the elements that it mentions."""
     kernels = set(re.findall(r"^def (\w+)\(", text, re.MULTILINE)) - OURS
     named = sorted(one for one in kernels if len(kernels) == 1 or re.search(rf"\b{one}\(", complaint))
     lines = [line.strip() for line in COLOUR.sub("", complaint).splitlines()]

@@ -1,13 +1,13 @@
 """Piecewise cubic signals inside a compiled simulation, where their knots are passed in order.
 
-Coefficients stand as in `scipy.interpolate.PPoly`, but the lowest power first: one row for a signal that is held, else four. The text of these functions is compiled
-once into a module of its own, which all generated ones import.
+Coefficients are stored as in `scipy.interpolate.PPoly`, but with the lowest power first: one row for a held signal,
+else four. The text of these functions is compiled once into its own module, which all generated modules import.
 """
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
 
 
 def piece_at(knots, i, t):
-    """Index of the piece that holds at time t, searched from piece i on."""
+    """Index of the piece at time t, searched from piece i on."""
     while knots[i + 1] <= t:
         i += 1
     return i

@@ -1,7 +1,8 @@
-"""The simulator fed command by command: what the plant node and the offline run of an experiment have in common.
+"""The simulator with commands as they arrive, used by the plant node and by the offline run of an experiment.
 
-Time is whole nanoseconds since the start of the run. The result depends on the commands and their stamps alone, not on
-the chunks in which they are fed: a step never crosses a sample or a command, so every chunking takes the same steps.
+Time is whole nanoseconds since the start of the run. The result depends only on the commands and their stamps, not
+on the chunks in which they arrive: a step never crosses a sample or a command, so the steps are the same for any
+chunks.
 """
 
 from bisect import bisect_right
@@ -20,13 +21,14 @@ from rhythmid.simulation.transport import CommandPath, physical_times
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
-TRANSPORT = ("input_delay", "measurement_delay")  # in the graph these are the delay injectors
+TRANSPORT = ("input_delay", "measurement_delay")  # in the ROS graph these are the delay injectors
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Plant output at grid times; arrays of shape (n,). `position` [m] is what the sensor says, before any transport
-    delay; `velocity` [m/s] is true; `effort` [N] the total actuator force, `forcing` [N] the part made on the robot."""
+    """Plant output at grid times; arrays of shape (n,). `position` [m] is the sensor's value, before any transport
+    delay. `velocity` [m/s] is the true one, `effort` [N] the total actuator force, `forcing` [N] the part generated
+    on the robot."""
 
     stamp_ns: Stamps
     position: Array
@@ -46,8 +48,8 @@ def forcing_at(model: Model, times: Array) -> Array:
 
 
 def settled(model: Model, periods: int = 120, tolerance: float = 1e-12) -> tuple[Array, Array]:
-    """State vector at t = 0 after the forced, uncommanded model has run long enough to be on its limit cycle, and what elements
-    with a dead time need of the past there.
+    """State vector at t = 0 of the forced, uncommanded model on its limit cycle, after `periods` at most, and the
+    history that elements with a dead time need there.
 
     Without forcing the machine comes to rest. Starts from rest at the first spring's rest length.
     """
@@ -78,10 +80,10 @@ def settled(model: Model, periods: int = 120, tolerance: float = 1e-12) -> tuple
 
 
 class Plant:
-    """A model that runs, fed with commands as they arrive.
+    """A running model with commands as they arrive.
 
-    `period_ns` is the sample period, `initial` (position, velocity), a full state, or None for the settled machine;
-    `seed` drives the model's noise. The model's own transport delays are left out: see `TRANSPORT`.
+    `period_ns` is the sample period [ns]. `initial` is (position, velocity), a full state, or None for the settled
+    machine. `seed` drives the model's noise. The model's own transport delays are left out: see `TRANSPORT`.
     """
 
     def __init__(
@@ -126,7 +128,8 @@ class Plant:
         self._efforts.extend(np.asarray(effort, dtype=float).tolist())
 
     def advance(self, until_ns: int) -> Samples:
-        """All grid samples up to `until_ns` that have not been given out; every command stamped up to then is known.
+        """All grid samples up to `until_ns` that have not been returned yet; all commands stamped up to then must
+        be known.
 
         Raises InputError when the simulation diverges.
         """

@@ -1,7 +1,8 @@
 """Continuous-time signals: every sampled command or forcing becomes a piecewise polynomial of degree <= 3.
 
-How a sampled signal continues between its samples (its *hold*) is physics: a command over a topic is held until
-the next one arrives (zero order), a measured voltage is band-limited. `scipy.interpolate.PPoly` carries all of them.
+The behaviour of a sampled signal between its samples (its *hold*) is physics: a command over a topic is held until
+the next one arrives (zero order), a measured voltage is band-limited. `scipy.interpolate.PPoly` represents all of
+them.
 """
 
 from typing import Literal
@@ -14,9 +15,9 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline, PPoly
 Hold = Literal["zero", "linear", "band_limited"]
 Array = NDArray[np.float64]
 
-FAR = 1e300  # seconds; stands for "for ever" in the compiled simulator, where inf - inf would be NaN
-OVERSAMPLING = 4  # by which cubic pieces follow a signal up to its Nyquist frequency
-FOR_EVER = FAR / 2  # [s] a knot beyond it is no time: the last value is held for ever
+FAR = 1e300  # [s]; stands for "for ever" in the compiled simulator, where inf - inf would be NaN
+OVERSAMPLING = 4  # number of cubic pieces per sample, for a signal up to its Nyquist frequency
+FOR_EVER = FAR / 2  # [s] a later knot is no time: the last value is held for ever
 
 
 def zero_order_hold(time: Array, value: Array) -> PPoly:
@@ -42,7 +43,7 @@ def spline(time: Array, value: Array) -> PPoly:
 def band_limited(time: Array, value: Array, oversampling: int = OVERSAMPLING) -> PPoly:
     """Reconstruct a uniformly sampled band-limited signal (anti-alias filtered measurement); n >= 4.
 
-    Where samples are missing, the stretches on either side are reconstructed each by itself and joined by a straight line.
+    Where samples are missing, the stretches on either side are reconstructed separately and joined by a straight line.
     """
     step = np.diff(time)
     broken = np.flatnonzero(step > 1.5 * float(np.median(step)))
@@ -105,9 +106,9 @@ def continuous(time: Array, value: Array, hold: Hold) -> PPoly:
 def impulse_preserving(held: PPoly) -> PPoly:
     """Smooth surrogate for a zero-order-held command that is sampled far above the machine's dynamics.
 
-    The derivative of a cubic spline through the command's integral at its knots: it has the same impulse, so a mass cannot
-    tell the two apart, and an integrator need not stop at every knot. The integral is bent at every knot; what the bends
-    hold of low frequencies is a twelfth of its second difference, which is added.
+    It is the derivative of a cubic spline through the command's integral at its knots. It has the same impulse, so
+    its effect on a mass is the same, and an integrator need not stop at every knot. The integral has a kink at
+    every knot. The low-frequency content of these kinks is a twelfth of the second difference, which is added.
     """
     knots, values = held.x[:-1], held.c[-1]
     step = float(np.median(np.diff(knots)))
@@ -121,7 +122,7 @@ def impulse_preserving(held: PPoly) -> PPoly:
 
 
 def fast_length(least: int) -> int:
-    """Length of a Fourier transform that is quick, at least `least`."""
+    """Length, at least `least`, for which a Fourier transform is fast."""
     return next_fast_len(least, True) or least
 
 
@@ -131,7 +132,7 @@ def is_held(signal: PPoly) -> bool:
 
 
 def is_smooth(signal: PPoly) -> bool:
-    """Whether a signal has no corners at its knots, but for where samples are missing."""
+    """Whether a signal has no corners at its knots, except where samples are missing."""
     return signal.c.shape[0] == 4
 
 

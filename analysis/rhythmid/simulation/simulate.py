@@ -1,4 +1,4 @@
-"""The one simulator: every run of a model, in a node, offline or inside a fit, goes through here."""
+"""The one simulator: every run of a model, in a node, offline or inside a fit, uses it."""
 
 from dataclasses import dataclass
 
@@ -13,15 +13,15 @@ from rhythmid.simulation.signal import pieces
 from rhythmid.simulation.transport import MEASUREMENT, delayed_command, physical_times
 
 Array = NDArray[np.float64]
-MAX_STEP = 2.5e-4  # [s] four steps in a sample at 1 kHz
+MAX_STEP = 2.5e-4  # [s] four steps per sample at 1 kHz
 
 
 @dataclass(frozen=True)
 class Trajectory:
     """A simulated run; all arrays of shape (n,) except `states` (n, q).
 
-    `time` [s] are the stamps that were asked for and `physical` [s] when the machine was there: earlier by the
-    measurement delay. `output` is what the sensor says; `effort` the total actuator force; `states` all states.
+    `time` [s] are the requested stamps, `physical` [s] the times of the machine: earlier by the measurement delay.
+    `output` is the sensor's value; `effort` the total actuator force; `states` all states.
     """
 
     time: Array
@@ -41,8 +41,8 @@ def start_states(
     command: float = 0.0,
     forcing: float = 0.0,
 ) -> Array:
-    """State vector at the start: position [m], velocity [m/s], and the elements' own states as they would be there after
-    a while with this command and forcing [N]."""
+    """State vector at the start: position [m], velocity [m/s], and the elements' own states after a long time with
+    this command and forcing [N]."""
     start = np.zeros(len(compiled.layout.states))
     start[:2] = position, velocity
     index = {name: i for i, name in enumerate(compiled.layout.states)}
@@ -57,7 +57,7 @@ def start_states(
                 term.element.own, term.element.initial(position, velocity, signal, **arguments)
             ):
                 place = index.get(f"{term.label}.{state}")
-                if place is not None:  # none in the command path of a machine that its base drives
+                if place is not None:  # there is none in the command path of a machine driven by its base
                     start[place] = value
     return start
 
@@ -106,7 +106,7 @@ def simulate(
 
 
 def samplers(model: Model, seed: int) -> list:
-    """What happens to sampled outputs, in order: one function (stamps, samples) -> samples for each noise or rounding."""
+    """Operations on sampled outputs, in order: one function (stamps, samples) -> samples for each noise or rounding."""
     return [
         term.element.sampler(np.random.default_rng([seed, index]), **term.numbers)
         for index, term in enumerate(model.terms)

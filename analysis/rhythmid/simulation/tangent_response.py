@@ -1,6 +1,6 @@
-"""The recursion by which small changes of state and force travel along a trajectory, compiled once.
+"""Recursion that propagates small changes of state and force along a trajectory, compiled once.
 
-The text of this function goes, as it stands here, into a module of its own.
+The text of this function is copied unchanged into its own module.
 """
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
 
@@ -8,10 +8,10 @@ import numpy as np
 
 
 def run(maps, direct, force, response):
-    """Fill the change (n,) of an output that a force (n,), straight between its values, makes, and return n.
+    """Fill the change (n,) of an output due to a force (n,), linear between its values, and return n.
 
-    `maps` (n - 1, q + 1, q + 2) lead over each interval from the change of the state and the force at both ends to that of the state and
-    of the output; `direct` is what the force does to the first output.
+    `maps` (n - 1, q + 1, q + 2) map, over each interval, the change of the state and the force at both ends to the
+    change of the state and of the output; `direct` is the direct effect of the force on the first output.
     """
     count = maps.shape[1] - 1
     state = np.zeros(count)

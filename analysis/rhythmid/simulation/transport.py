@@ -1,7 +1,8 @@
-"""Transport delays of a model: by how much later than its stamp a command acts, and how old a measurement is.
+"""Transport delays of a model: delay of a command's action after its stamp, and age of a measurement.
 
-An element of the command path, the sensor or the timing that only delays says by how much in its function `delay`; nothing else
-calls it. Dead times inside a loop act on the past of a signal: they belong to the compiled simulator (`history`).
+An element of the command path, the sensor or the timing that only delays gives its delay by its function `delay`,
+which is called only here. Dead times inside a loop act on the past of a signal: they belong to the compiled
+simulator (`history`).
 """
 
 from collections.abc import Iterator
@@ -15,11 +16,11 @@ from rhythmid.simulation.signal import FOR_EVER
 
 Array = NDArray[np.float64]
 INPUT_DELAY, MEASUREMENT_DELAY = "input_delay.delay", "measurement_delay.delay"  # parameters of a model
-MEASUREMENT = ("sensor", "timing")  # slots that a measurement passes
+MEASUREMENT = ("sensor", "timing")  # slots on the path of a measurement
 
 
 def delays(model: Model, stamps: Array, *slots: str) -> Iterator[tuple[Term, Array]]:
-    """The elements of these slots that delay, each with its own delay (n,) [s] at stamps (n,) [s]."""
+    """The elements of these slots with a delay, each with its delay (n,) [s] at stamps (n,) [s]."""
     for term in model.terms:
         if term.element.delay is not None and term.element.slot in slots:
             yield term, _delay(term, stamps)
@@ -31,7 +32,8 @@ def _delay(term: Term, stamps: Array) -> Array:
 
 
 def physical_times(model: Model, stamps: Array) -> Array:
-    """When the measurements stamped `stamps` [s] were taken: stamps less delay, skew and jitter of the model.
+    """Times [s] at which the measurements stamped `stamps` [s] were taken: stamps minus delay, skew and jitter of
+    the model.
 
     A measurement cannot overtake an earlier one.
     """
@@ -43,22 +45,22 @@ def physical_times(model: Model, stamps: Array) -> Array:
 
 
 class CommandPath:
-    """The delays of a model's command path, one element after another, for commands in the order of their stamps, fed whole or
-    in chunks. A command cannot overtake an earlier one."""
+    """The delays of a model's command path, one element after another, for commands in the order of their stamps,
+    given at once or in chunks. A command cannot overtake an earlier one."""
 
     def __init__(self, model: Model) -> None:
         self._terms = [t for t in model.terms if t.element.slot == "command" and t.element.delay is not None]
         self._last = [-np.inf] * len(self._terms)
 
     def times(self, stamps: Array) -> Array:
-        """When commands stamped `stamps` [s] act; (n,) -> (n,)."""
+        """Times (n,) [s] at which commands stamped `stamps` (n,) [s] act."""
         acting = stamps
         for _, passed in self.stages(stamps):
             acting = passed
         return acting
 
     def stages(self, stamps: Array) -> Iterator[tuple[Array, Array]]:
-        """Of each element its own delays (n,) [s], and when the commands have passed it (n,) [s]."""
+        """For each element its own delays (n,) [s], and the times (n,) [s] at which the commands leave it."""
         for index, term in enumerate(self._terms):
             late = _delay(term, stamps)
             stamps = stamps + late
@@ -71,7 +73,7 @@ class CommandPath:
 
 
 def command_delay(model: Model, stamps: Array) -> Array | None:
-    """Delays (n,) [s] of commands stamped `stamps` [s]; None where nothing in the command path delays."""
+    """Delays (n,) [s] of commands stamped `stamps` [s]; None where the command path has no delay."""
     stages = list(CommandPath(model).stages(stamps))
     if not stages:
         return None
@@ -81,7 +83,7 @@ def command_delay(model: Model, stamps: Array) -> Array | None:
 
 
 def delayed_command(model: Model, command: PPoly | None) -> PPoly | None:
-    """The command as it acts on the machine: its knots moved by the delays of the command path."""
+    """The command as it acts on the machine: its knots are shifted by the delays of the command path."""
     if command is None:
         return None
     finite = command.x < FOR_EVER

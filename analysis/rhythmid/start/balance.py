@@ -1,5 +1,6 @@
-"""The balance of forces of a machine of which nothing is known yet, by least squares: what goes with the acceleration, the speed and its
-direction, the position and its sine. A first guess for a nominal model, no estimate: that is what `identify` is for."""
+"""Force balance of an unknown machine by least squares: terms proportional to the acceleration, the speed and its
+sign, the position and its sine. It gives a first guess for a nominal model; the estimate is the task of
+`identify`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,43 +16,46 @@ from rhythmid.model import Model
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-LATEST_ACTION = 0.2  # s by which what drives may act later than it was recorded, in a first guess
-EARNS_PLACE = (
-    0.9  # of what a balance leaves: by so much an element has to lower it to be among the first guesses
-)
-# of the power of what drives, that it has to explain, too: less is a matter of friction, ripple and noise, which anything takes up at random.
-# Of a delay of half a radian, inertia, damper and spring leave (ω τ)²/2 of the size, which is as much; of a shorter one less
+LATEST_ACTION = 0.2  # [s] largest delay of the driving signal in a first guess
+EARNS_PLACE = 0.9  # ratio of residuals to which an element has to lower the balance to be a first guess
+# share of the driving signal's power that the element also has to explain: less may be friction, ripple and noise,
+# which any element absorbs at random. With a delay of half a radian, inertia, damper and spring leave (ω τ)²/2 of
+# the size, which is as much; with a shorter one less
 OF_THE_DRIVE = 0.015
-STEADY = 1e-9  # of its size, within which what drives never changes: the rounding of the filters
+STEADY = 1e-9  # relative variation below which the driving signal is constant: rounding error of the filters
 COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant", "friction")
 POSITIVE = frozenset({"acceleration", "velocity", "position", "friction"})
-SLOW = 0.03  # of the fast speed (its 95 % quantile), within which dry friction changes its sign: as for the balance of effort
-MOST_ROWS = 4000  # of the balance: more would not make a first guess better
-FED_BACK = 1e-3  # share of what drives that a multiple of the position leaves, below which a controller made it of the position
-THERE_AND_BACK = 2.0  # of its travel, that a machine goes at least that comes back to where it began
-LEAST_ROWS = 40  # rows of a stretch without which nothing is guessed from it
+# share of the fast speed (its 95 % quantile) within which dry friction changes its sign: as for the effort balance
+SLOW = 0.03
+MOST_ROWS = 4000  # largest number of rows: more would not improve a first guess
+# share of the driving signal that a multiple of the position leaves, below which it is a controller's position feedback
+FED_BACK = 1e-3
+THERE_AND_BACK = 2.0  # least path length, in units of the travel, of a machine that returns to its start
+LEAST_ROWS = 40  # least rows of a stretch for a guess
 
 
 @dataclass(frozen=True)
 class Law:
-    """Coefficients by column, the share of the driving signal's power that they leave (0: nothing), and by how much later it acts [s]."""
+    """Coefficients by column, the share of the driving signal's power that they leave unexplained, and its delay [s]."""
 
     coefficients: dict[str, float]
     left: float
     delay: float = 0.0
 
     def earns_place(self, simpler: "Law") -> bool:
-        """Whether it explains clearly more than a simpler law, of what that leaves and of what drives."""
+        """Whether it explains clearly more than a simpler law, relative to that law's residual and to the driving
+        signal."""
         return self.left < EARNS_PLACE * simpler.left and simpler.left - self.left >= OF_THE_DRIVE
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What drives, and the columns of the balance, of all stretches, low-pass filtered.
+    """The driving signal and the columns of the balance for all stretches, low-pass filtered.
 
-    `drives` (n,) and `columns` (n, 7) of each stretch, in the order of COLUMNS; `period` [s] of each, as the filtered motion is sampled; `margin` samples at either end
-    that the filter spoils. `span` is the travel of the position, relative to the base where that moves; where the base drives
-    (`by_base`), what drives is −a.
+    `drives` (n,) and `columns` (n, 7) belong to each stretch, in the order of COLUMNS. `period` [s] is the sample
+    period of the filtered motion, `margin` the number of samples at either end that are affected by the filter.
+    `span` is the travel of the position, relative to a moving base. Where the base drives the machine (`by_base`),
+    the driving signal is −a.
     """
 
     drives: tuple[Array, ...]
@@ -64,7 +68,8 @@ class Rows:
 
     @classmethod
     def of(cls, records: Sequence[Record], bare: Model) -> "Rows":
-        """Rows of records whose input or effort drives. Raises InputError where they are too short or nothing drives them."""
+        """Rows of records driven by input or effort. Raises InputError where they are too short or have no driving
+        signal."""
         raw = stretches(records, bare)
         chosen = bandwidth_of(raw, bare)
         motions = [motion_of(one, bare, chosen.motion, chosen.low) for one in raw]
@@ -81,26 +86,27 @@ class Rows:
 
     @property
     def steady(self) -> bool:
-        """Whether what drives never changes: then a constant balances it, and tells nothing of the machine."""
+        """Whether the driving signal is constant: then a constant balances it, and it contains no information about
+        the machine."""
         every = np.concatenate(self.drives)
         return not self.by_base and bool(np.ptp(every) <= STEADY * np.abs(every).max())
 
     @property
     def reversed(self) -> "Rows":
-        """The same with what drives counted the other way."""
+        """The same rows with the opposite sign of the driving signal."""
         return replace(self, drives=tuple(-one for one in self.drives))
 
     @property
     def comes_back(self) -> bool:
-        """Whether the position goes more than there and back: its path is twice its travel at least."""
+        """Whether the position moves back and forth: its path is at least twice its travel."""
         place = COLUMNS.index("position")
         path = sum(float(np.abs(np.diff(one[:, place])).sum()) for one in self.columns)
         return path >= THERE_AND_BACK * self.span
 
     def delay(self, names: Sequence[str]) -> float:
-        """By how much later [s] what drives acts, where that makes the balance of these columns clearly better; else 0.
+        """Delay [s] of the driving signal that makes the balance of these columns clearly better; else 0.
 
-        A balance that is still getting better at the end of the range shows no delay.
+        If the balance still improves at the end of the range, no delay is detected.
         """
         if self.by_base or self.steady or self.is_fed_back():
             return 0.0
@@ -115,7 +121,8 @@ class Rows:
         return best.delay if best.earns_place(at_once) and not at_the_end else 0.0
 
     def is_fed_back(self) -> bool:
-        """Whether what drives is −k times the position and a constant: a delayed balance would tell of that law, not of the machine."""
+        """Whether the driving signal is −k times the position plus a constant: a delayed balance would fit that
+        feedback, not the machine."""
         x, drive = (
             np.concatenate(
                 [one[margin : len(one) - margin] for one, margin in zip(of, self.margin, strict=True)]
@@ -127,7 +134,7 @@ class Rows:
         return both < 0.0 and 1.0 - both**2 / (float(x @ x) * float(drive @ drive)) < FED_BACK
 
     def fit(self, names: Sequence[str], delay: float = 0.0) -> Law:
-        """Force balance of these columns; coefficients of acceleration, velocity and position are not negative."""
+        """Force balance of these columns; coefficients of acceleration, velocity and position are nonnegative."""
         places = [COLUMNS.index(name) for name in names]
         every = max(1, sum(map(len, self.drives)) // MOST_ROWS)
         sides, matrices = [], []
@@ -144,7 +151,7 @@ class Rows:
         size[~told] = 1.0
         low = [0.0 if name in POSITIVE else -np.inf for name in names]
         solved = lsq_linear(matrix / size, side, (low, np.inf))
-        told &= solved.active_mask == 0  # it ends a little inside a bound, which stands for nothing at all
+        told &= solved.active_mask == 0  # a coefficient near its bound counts as zero
         power = float(np.sum((side - (0.0 if self.steady else side.mean())) ** 2)) or 1.0
         return Law(
             dict(zip(names, np.where(told, solved.x / size, 0.0).tolist(), strict=True)),
@@ -154,12 +161,14 @@ class Rows:
 
 
 def _filtered(one: Motion, bandwidth: Bandwidth, slow: float) -> Array:
-    """What drives and all columns (n, 8), without what is above the effort's bandwidth; friction changes its sign within the speed `slow`."""
+    """The driving signal and all columns (n, 8) below the effort's bandwidth; friction changes its sign within the
+    speed `slow`."""
     x, v = one.leg_position, one.leg_velocity
     friction = np.tanh(v / slow) if slow > 0.0 else np.zeros(len(v))
     level = np.ones(len(x))
     both = np.column_stack([one.effort, one.acceleration, v, x, np.sin(x), np.cos(x), level, friction])
     both = high_pass(low_pass(both, one.period, bandwidth.effort), one.period, bandwidth.low)
     if bandwidth.low > 0.0:
-        both[:, 1 + COLUMNS.index("constant")] = 0.0  # what the filter leaves of a constant tells nothing
+        # the remainder of a constant after the filter contains no information
+        both[:, 1 + COLUMNS.index("constant")] = 0.0
     return both

@@ -1,5 +1,5 @@
-"""The balance of forces of records of which little is told: with what brings the machine back, and with the sign of what drives and the
-unit of an angle that it shows."""
+"""Force balance of records with little metadata: includes the restoring force, the sign of the driving signal, and
+the unit of an angle."""
 
 import math
 from collections.abc import Sequence
@@ -10,13 +10,14 @@ from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.start.balance import Law, Rows
 
-UNEXPLAINED = 0.8  # share of what drives that a balance may leave at most, for its values to be taken
+UNEXPLAINED = 0.8  # largest unexplained share of the driving signal for which the balance's values are used
 DEGREE = math.pi / 180.0  # rad
 
 
 @dataclass(frozen=True, eq=False)
 class Balanced:
-    """What drives and the columns, the law that balances them, what brings the machine back, and what is doubtful about the recording."""
+    """The driving signal and the columns, the law that balances them, the restoring force, and doubts about the
+    recording."""
 
     rows: Rows
     law: Law
@@ -25,16 +26,16 @@ class Balanced:
 
     @property
     def explained(self) -> str:
-        """Share of what drives that the law explains, in per cent."""
+        """Share of the driving signal that the law explains, in per cent."""
         return f"{max(0.0, 1.0 - self.law.left):.0%}"
 
 
 def balance_of(
     records: Sequence[Record], bare: Model, rotary: bool, driver: str, unit_told: bool
 ) -> Balanced:
-    """The balance of records that the channel `driver` drives; `unit_told` says whether the unit of the position is known.
+    """The balance of records driven by the channel `driver`; `unit_told` says whether the unit of the position is known.
 
-    Raises InputError where the records are too short or nothing drives them.
+    Raises InputError where the records are too short or have no driving signal.
     """
     found = _of_either_sign(records, bare, rotary, driver)
     if unit_told or not rotary or any(one.output_kind != "position" for one in records):
@@ -53,12 +54,12 @@ def balance_of(
 
 
 def _scaled(record: Record, scale: float) -> Record:
-    """The record with its output in another unit; a velocity beside it is left out."""
+    """The record with its output in another unit, without a recorded velocity."""
     return replace(record, output=replace(record.output, value=record.output.value * scale), velocity=None)
 
 
 def _of_either_sign(records: Sequence[Record], bare: Model, rotary: bool, driver: str) -> Balanced:
-    """The balance, of what drives counted the other way where that alone shows how the machine moves."""
+    """The balance, with the opposite sign of the driving signal where only that explains the motion."""
     rows = Rows.of(records, bare)
     plain = Balanced(rows, *restoring(records, rows, rotary, inertial=True))
     turned = None if rows.by_base else _reversed(records, rows, plain.law, rotary)
@@ -73,10 +74,12 @@ def _of_either_sign(records: Sequence[Record], bare: Model, rotary: bool, driver
 
 
 def _reversed(records: Sequence[Record], rows: Rows, law: Law, rotary: bool) -> tuple[Law, str] | None:
-    """The balance of what drives counted the other way, where that explains clearly more, and acts no later; None else.
+    """The balance with the opposite sign of the driving signal, where it explains clearly more without more delay;
+    else None.
 
-    The inertia itself has to explain a share: what a controller makes of position and speed is balanced by spring and damper that way.
-    The wrong sign of a periodic drive is half a period of delay, so that a later law tells nothing of the sign.
+    The inertia itself has to explain a share: the effort of a controller of position and speed is balanced by
+    spring and damper with the opposite sign. The opposite sign of a periodic signal is half a period of delay, so a
+    law with more delay says nothing about the sign.
     """
     turned, kind = restoring(records, rows.reversed, rotary, inertial=True)
     if turned.left > UNEXPLAINED or turned.delay > law.delay or not turned.earns_place(law):
@@ -86,14 +89,15 @@ def _reversed(records: Sequence[Record], rows: Rows, law: Law, rotary: bool) -> 
 
 
 def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
-    """The balance with what brings the machine back, if anything does: a spring, gravity of a pendulum, or neither.
+    """The balance with the restoring force, if there is one: a spring, or gravity of a pendulum.
 
-    The integral of a speed drifts. Gravity goes with the angle itself, which it does not tell; a spring shows in it only where it comes back.
-    Either has to explain clearly more beside dry friction, too, which every machine may have and which a spring takes up in part.
+    The integral of a speed drifts. Gravity depends on the absolute angle, which the integral does not give; a
+    spring is identifiable from it only where the motion returns. Either has to explain clearly more even beside dry
+    friction, which every machine may have and whose effect a spring partly absorbs.
     """
     measured = all(record.output_kind == "position" for record in records)
     moving = ["acceleration", "velocity"] if inertial else ["velocity"]
-    level = [] if rows.steady else ["constant"]  # a constant would balance what never changes
+    level = [] if rows.steady else ["constant"]  # a constant would balance a constant driving signal
     full = [*moving, "position", *level]
     delay = rows.delay(full)
     plain = rows.fit(moving, delay)

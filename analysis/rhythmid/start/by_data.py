@@ -1,4 +1,5 @@
-"""What a number is of which no name tells it: by what it follows, what follows it, and what it goes with."""
+"""Meaning of a number whose name does not state it, from its relations to the other numbers: integral, lag and
+coherence."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -36,11 +37,12 @@ from rhythmid.start.relation import (
 )
 
 OR_ELSE = "a base that moves is  kind: base_displacement, what a controller is asked for  kind: reference"
-NAMED = 8  # numbers that a note names
+NAMED = 8  # largest number of numbers in a note
 
 
 def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[Choice, list[Known]]:
-    """Where no name tells: the integral of another one, else what is driven more by the others than it drives them."""
+    """The output where no name states it: the integral of another number, else the number that the others drive
+    more than it drives them."""
     if not able and len(known) == 1 and known[0].meaning.commanded is not True:
         doubts = ("its unit is none of a motion: set kind, unit and scale",)
         return Choice(known[0].one, "the only number that was recorded", (), doubts), [
@@ -79,7 +81,7 @@ def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[C
 
 
 def by_data(one: Known, output: Recorded, measured: Quantity, velocity: Choice | None) -> Known:
-    """What a command without a quantity asks for: what it comes closest to."""
+    """The quantity of a command whose name does not state it: that of the closest motion."""
     if one.quantity is not None or is_counted(one.one) or of_one_array(one.one, output):
         return one
     targets: list[tuple[Quantity, Recorded]] = [(measured, output)]
@@ -111,14 +113,16 @@ def by_data(one: Known, output: Recorded, measured: Quantity, velocity: Choice |
 
 
 def _leads(one: Known, answer: Recorded, told: Follows) -> bool:
-    """Whether the answer comes later; at once it does where a name says so, or only the past of the one tells of the other."""
+    """Whether the answer is later. An answer without lag counts if a name says so, or if only the command's past
+    predicts it."""
     if told.lag != 0.0 or one.meaning.commanded:
         return told.lag >= 0.0
     return surely_drives(one.one, answer, predicts(one.one, answer), predicts(answer, one.one))
 
 
 def _driver(one: Known, output: Recorded) -> Known:
-    """What drives, where its name, its coherence with the output or its past says so; else what it was."""
+    """The number as a driving signal, where its name, its coherence with the output or its past supports that; else
+    unchanged."""
     letter = meaning_of(one.one).quantity
     if letter == "position" and differ_in_number(one.one, output):
         return one  # a second joint or sensor
@@ -150,7 +154,8 @@ def _coherence(one: Known, output: Recorded) -> str:
 
 
 def note_of_unknown(unknown: Sequence[Known], output: Recorded) -> str:
-    """What to tell of numbers of which neither a name nor the data say that they drive, where nothing else does."""
+    """Note on numbers that neither a name nor the data identify as driving signals, where there is no other driving
+    signal."""
     told = sorted(((coherent(one.one, output), one) for one in unknown), key=lambda pair: -pair[0])
     listed = "; ".join(f"{one.one} (coherence {share:.2f})" for share, one in told[:NAMED])
     more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""

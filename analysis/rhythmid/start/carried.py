@@ -1,4 +1,5 @@
-"""A motion that drives another one where nothing else does, such as the tilt of a beam on which a ball rolls."""
+"""A motion that drives another motion where there is no other driving signal, such as the tilt of a beam on which a
+ball rolls."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,15 +10,15 @@ from rhythmid.record.inventory import Recorded
 from rhythmid.start.meaning import Meaning, rotary_of
 from rhythmid.start.relation import SURE, follows, predicts
 
-ONE_WAY = 4.0  # times the evidence for the other way that has to be there for the one
-BEYOND_CHANCE = 3.0  # times the evidence of shifted records, the most of them
+ONE_WAY = 4.0  # ratio of evidence that is needed for one direction over the other
+BEYOND_CHANCE = 3.0  # ratio to the largest evidence of shifted records
 SHIFTS = 6  # parts of a record by which it is shifted
-LEAST_CORRELATION = 0.3  # of what drives with what it drives, at the lag where it is greatest
+LEAST_CORRELATION = 0.3  # least correlation of driver and driven motion, at the lag of its maximum
 
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """The driven motion, what drives it, and how much surer that is than by chance, there and back."""
+    """The driven motion, its driver, and the strength of the evidence relative to chance, in both directions."""
 
     driven: Recorded
     driver: Recorded
@@ -26,12 +27,12 @@ class Carried:
 
     @property
     def reason(self) -> str:
-        """Why it is the driven one, as a phrase."""
+        """Reason why it is the driven motion, as a phrase."""
         return f"{self.driver} drives it: its past tells of this one ({self.there:.3g} times as much as by chance; back {self.back:.2g})"
 
     @property
     def doubt(self) -> str:
-        """What a user should know of a motion that is taken for a force, as a phrase."""
+        """Doubt about a motion that is taken for a force, as a phrase."""
         unit = self.driver.unit or "its unit"
         return (
             f"a motion, not a force: the model's forces are in {unit}, as if they were in proportion to it; "
@@ -40,9 +41,9 @@ class Carried:
 
 
 def carried_motion(known: Sequence[tuple[Recorded, Meaning]]) -> Carried | None:
-    """The motion that slides where one that turns drives it, or the other way about, and no effort, command or base was recorded.
+    """The sliding motion that a rotating one drives, or the reverse, where no effort, command or base was recorded.
 
-    Two of one kind may be joints of one robot, whose plan moves one before the other: of them nothing is told.
+    Two motions of one kind may be joints of one robot whose plan moves one before the other, so they are not considered.
     """
     motions = [one for one, meaning in known if meaning.quantity == "position"]
     others = [
@@ -67,10 +68,11 @@ def carried_motion(known: Sequence[tuple[Recorded, Meaning]]) -> Carried | None:
 
 
 def surely_drives(driver: Recorded, driven: Recorded, there: float, back: float) -> bool:
-    """Whether the one tells of the other much more than back, goes with it, later, and tells much more than its shifted record does.
+    """Whether the driver predicts the driven motion much better than the reverse, is correlated with it and
+    earlier, and predicts it much better than its shifted record does.
 
-    `there` and `back` are what `predicts` says of them. Two smooth motions help to predict each other however they came about, and
-    so do shifted ones.
+    `there` and `back` are the results of `predicts`. Any two smooth motions help to predict each other, whatever
+    their origin, and so do shifted ones.
     """
     if there < max(SURE, ONE_WAY * back):
         return False

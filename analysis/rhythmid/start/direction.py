@@ -1,4 +1,4 @@
-"""Which of two copies of one motion leads: what is asked for comes before what is measured."""
+"""Which of two copies of one motion leads: the command is earlier than the measurement."""
 
 from dataclasses import replace
 
@@ -7,16 +7,15 @@ from rhythmid.start.known import Choice, Known
 from rhythmid.start.meaning import names_a_place, words_of
 from rhythmid.start.relation import Follows, follows, predicts
 
-COPY = 0.9  # correlation with its command from which an answer is the same quantity
-LEAST_LAG = 2.5  # samples: two sensors of one motion may be that far apart by their filters and buses
-AGAINST = (
-    4.0  # times the evidence for the one direction, from which that for the other one contradicts the lag
-)
-AXES = frozenset("x y z".split())  # motions of one body in several directions, however alike they are
+COPY = 0.9  # correlation with its command above which an answer is the same quantity
+LEAST_LAG = 2.5  # samples: two sensors of one motion may be that far apart because of filters and buses
+AGAINST = 4.0  # ratio of evidence for the opposite direction above which it contradicts the lag
+AXES = frozenset("x y z".split())  # motions of one body in several directions, however similar
 
 
 def leads(first: Recorded, second: Recorded) -> Follows | None:
-    """How the second follows the first, where it is a later copy of it and its past does not tell more of the first; None else."""
+    """How the second follows the first, where it is a later copy and its past does not predict the first better;
+    else None."""
     told = follows(first, second)
     if told.correlation < COPY or not told.is_copy or told.lag * min(first.rate, second.rate) < LEAST_LAG:
         return None
@@ -24,10 +23,11 @@ def leads(first: Recorded, second: Recorded) -> Follows | None:
 
 
 def by_direction(output: Choice, known: list[Known]) -> tuple[Choice, list[Known], list[str]]:
-    """The output, what is known, and what a user should know, where another channel of its quantity leads or follows it as a copy.
+    """The output, the known numbers, and notes, where another channel of the same quantity leads or follows the
+    output as a copy.
 
-    The earlier one was asked for, the later one was measured, unless a name says otherwise. Motions of other joints or of places, which
-    may lead as a motor leads its load, and axes of one body are left as they are.
+    The earlier one was commanded, the later one measured, unless a name says otherwise. Three kinds are left
+    unchanged: motions of other joints, motions at other locations (a motor leads its load), and axes of one body.
     """
     own = next(one for one in known if one.one is output.recorded)
     able = [one for one in known if one is not own and may_be_one_motion(own, one)]
@@ -49,7 +49,7 @@ def by_direction(output: Choice, known: list[Known]) -> tuple[Choice, list[Known
 
 
 def may_be_one_motion(own: Known, other: Known) -> bool:
-    """Whether no name tells which of the two was asked for, and they may be one motion."""
+    """Whether no name says which of the two was commanded, and they may be one motion."""
     meaning = other.meaning
     if other.quantity != own.quantity or meaning.commanded is not None or meaning.forcing or meaning.base:
         return False
@@ -61,7 +61,7 @@ def may_be_one_motion(own: Known, other: Known) -> bool:
 
 
 def _asked_for(first: Known, known: list[Known], told: Follows) -> list[Known]:
-    """What is known, with one of it as what was asked for."""
+    """The known numbers, with `first` as the command."""
     reason = f"it leads the output by {1e3 * told.lag:.3g} ms ({told.correlation:.2f} correlation)"
     asked = replace(first, meaning=replace(first.meaning, commanded=True, reason=reason))
     return [asked if one is first else one for one in known]
@@ -75,7 +75,7 @@ def _note(first: Recorded, last: Recorded, told: Follows) -> str:
 
 
 def doubt_of_direction(reference: Recorded, output: Recorded) -> str:
-    """What is doubtful about a reference that its name says to be one and that comes after the output; empty where it does not."""
+    """Doubt about a reference, by its name, that lags the output; empty where it does not."""
     told = leads(output, reference)
     if told is None:
         return ""
@@ -86,7 +86,8 @@ def doubt_of_direction(reference: Recorded, output: Recorded) -> str:
 
 
 def notes_of_other_joints(output: Recorded, others: list[Known]) -> list[str]:
-    """What to tell of motions of other joints, by their names, that lead or follow the output as a reference and its answer do."""
+    """Notes on motions of other joints, by their names, that lead or follow the output like a reference and its
+    answer."""
     pairs = [pair for one in others for pair in ((one.one, output), (output, one.one))]
     told = [(first, last, found) for first, last in pairs if (found := leads(first, last)) is not None]
     return [

@@ -1,4 +1,4 @@
-"""What drives the machine: efforts, a forcing, a reference, or the motion of its base."""
+"""Driving signals of the machine: efforts, a forcing, a reference, or the motion of its base."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,7 +15,7 @@ SAYS_READ = "its name says that it was read from a sensor"
 
 
 def not_read(left: Sequence[str]) -> str:
-    """What to tell where an effort was preferred to others, by name, because of what its own name says."""
+    """Note where an effort was preferred to others because of its name."""
     listed = ", ".join(left)
     return (
         f"{SAYS_READ}, and that of {listed} does not: where one of those is the machine's effort, put it here"
@@ -25,7 +25,7 @@ def not_read(left: Sequence[str]) -> str:
 def drivers(
     rest: list[Known], output: Recorded, measured: Quantity, ask: Ask
 ) -> tuple[dict[str, Choice], InputKind, Quantity]:
-    """What drives the machine: efforts commanded and measured, forcing, references, or the motion of its base."""
+    """Driving signals of the machine: commanded and measured efforts, forcing, references, or the motion of its base."""
     efforts = [one for one in rest if one.quantity == "effort"]
     forcing = [one for one in efforts if one.meaning.forcing]
     efforts = [one for one in efforts if not one.meaning.forcing]
@@ -33,8 +33,8 @@ def drivers(
     sensed = [one for one in efforts if not one.meaning.commanded]
     sensed = [
         one for one in sensed if one.meaning.certain
-    ] or sensed  # what a name says before what may be anything
-    if commanded and not forcing:  # a wrench beside a command is what pushes from outside
+    ] or sensed  # a number named as an effort comes before an unnamed one
+    if commanded and not forcing:  # a wrench beside a command is an external force
         forcing = [
             one for one in sensed if one.one.type.startswith("geometry_msgs/") and "Wrench" in one.one.type
         ]
@@ -72,22 +72,23 @@ def drivers(
 
 
 def _is_hardly_effort(one: Known, output: Recorded, least: float) -> bool:
-    """Whether no name says that it is an effort, and its coherence with the output is less than that.
+    """Whether no name says that it is an effort, and its coherence with the output is below `least`.
 
-    Beside a reference, which makes both, a motion of the tool and much else goes with the output in part.
+    A reference drives both the output and other signals, such as a motion of the tool, so those are partly coherent
+    with the output.
     """
     return meaning_of(one.one).quantity is None and coherent(one.one, output) < least
 
 
 def _beside_base(choice: Choice, base: list[Known]) -> Choice:
-    """The choice with a doubt where a motion of the base was recorded, too, which is left unused."""
+    """The choice, with a doubt where a motion of the base was recorded as well and is not used."""
     listed = ", ".join(str(one.one) for one in base)
     doubt = f"a motion of the base was recorded, too ({listed}), and is not used: where it is what drives, make it the input, with its kind"
     return replace(choice, doubts=(*choice.doubts, doubt))
 
 
 def _moving_base(base: list[Known]) -> tuple[Choice, InputKind]:
-    """The motion of the base that is greatest, and its kind."""
+    """The largest motion of the base, and its kind."""
     choice = strongest(base, "the motion of the base")
     picked = next(one for one in base if one.one is choice.recorded)
     if not (says_base(picked.one) and picked.meaning.certain):
@@ -100,7 +101,7 @@ def _moving_base(base: list[Known]) -> tuple[Choice, InputKind]:
 
 
 def _driving(able: list[Known], output: Recorded, reason: str, ask: Ask) -> Choice:
-    """Of several efforts the one that goes best with the output."""
+    """Among several efforts the one with the highest coherence with the output."""
     if len(able) == 1:
         return chosen(able[0], f"{reason}: {able[0].meaning.reason}")
     read = [one for one in able if says_it_was_read(one.one)] or able
@@ -124,7 +125,7 @@ def _driving(able: list[Known], output: Recorded, reason: str, ask: Ask) -> Choi
 def _commanded_and_measured(
     commanded: list[Known], sensed: list[Known], output: Recorded, ask: Ask
 ) -> tuple[Choice, Choice]:
-    """The measured effort that goes best with the output, and the command in its unit that does."""
+    """The measured effort with the highest coherence with the output, and the best such command in its unit."""
     commanded, sensed = of_one_unit(commanded, sensed)
     effort = _driving(sensed, output, "an effort that was measured", ask)
     command = _driving(matching(commanded, effort.recorded), output, "an effort that was asked for", ask)
@@ -138,7 +139,7 @@ def _commanded_and_measured(
 
 
 def _reference(rest: list[Known], output: Recorded, measured: Quantity) -> tuple[Choice | None, Quantity]:
-    """The position, else the velocity, that was asked for: the one that the output follows best."""
+    """The commanded position, else velocity, that the output follows best."""
     for quantity in ("position", "velocity"):
         able = [
             one for one in rest if one.meaning.commanded and one.quantity == quantity and not one.meaning.base

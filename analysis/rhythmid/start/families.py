@@ -1,6 +1,7 @@
-"""Families of channels: numbers of several joints that were recorded side by side, and the robot's joints that they belong to.
+"""Families of channels: numbers recorded together for several joints, and the robot's joints to which they belong.
 
-Fields of one message that differ in the joint's name, columns whose names differ in it or in a number, entries of an array.
+A family consists of fields of one message that differ in the joint's name, columns whose names differ in it or in a
+number, or entries of an array.
 """
 
 import json
@@ -11,19 +12,19 @@ from dataclasses import dataclass
 from rhythmid.record.inventory import Inventory, Recorded
 from rhythmid.start.meaning import Quantity, meaning_of, words_of
 
-GENERIC = frozenset({"joint"})  # words that a robot's file and its recordings add to a joint's name at will
+GENERIC = frozenset({"joint"})  # words that a robot's file and its recordings add to joint names arbitrarily
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Channels that differ in the joint only.
+    """Channels that differ only in the joint.
 
     Attributes
     ----------
     topic : of a message; empty for columns.
-    pattern : the field or the name of the column with a star in the joint's place.
-    members : by the recording's name of the joint, or its number.
-    told : whether joints are told apart by names, and not by numbers, whose order is a guess.
+    pattern : the field or the name of the column with a star instead of the joint.
+    members : by the joint's name in the recording, or its number.
+    told : whether joints are identified by names rather than by numbers, whose order is a guess.
     """
 
     topic: str
@@ -33,21 +34,21 @@ class Family:
 
     @property
     def first(self) -> Recorded:
-        """The first member, which stands for all."""
+        """The first member, as a representative of all."""
         return next(iter(self.members.values()))
 
     @property
     def quantity(self) -> Quantity | None:
-        """What its members are, None where nothing says it."""
+        """Quantity of its members; None where nothing states it."""
         return meaning_of(self.first).quantity
 
     @property
     def commanded(self) -> bool:
-        """Whether its members were asked for, not measured."""
+        """Whether its members are commanded rather than measured."""
         return meaning_of(self.first).commanded is True
 
     def channel(self, bag: bool) -> str:
-        """The channel as signals.yaml has it, without its braces."""
+        """The channel in the notation of signals.yaml, without braces."""
         named = (
             f"topic: {self.topic}, field: {json.dumps(self.pattern)}"
             if bag
@@ -59,7 +60,7 @@ class Family:
 
 
 def families_of(found: Inventory, joints: Sequence[str]) -> Iterator[Family]:
-    """The families of channels in a source, those with the most members first."""
+    """The families of channels in a source, in descending order of the number of members."""
     made: dict[tuple[str, str, bool], dict[str, Recorded]] = {}
     for one in found.recorded:
         for topic, pattern, name, told in _patterns(one, joints):
@@ -74,12 +75,13 @@ def families_of(found: Inventory, joints: Sequence[str]) -> Iterator[Family]:
 
 
 def _patterns(one: Recorded, joints: Sequence[str]) -> Iterator[tuple[str, str, str, bool]]:
-    """Topic, pattern, the joint's name in the recording, and whether that is a name, of every family a channel may be of."""
+    """Topic, pattern, the joint's name in the recording, and whether it is a name, for every possible family of a
+    channel."""
     if one.topic:
         if one.joint and f"[{one.joint}]" in one.field:
             yield one.topic, one.field.replace(f"[{one.joint}]", "[*]"), one.joint, True
         return
-    if "*" in one.column:  # which a pattern cannot name
+    if "*" in one.column:  # a pattern cannot name it
         return
     for joint in joints:
         for name in {joint, _plain(joint)}:
@@ -91,12 +93,12 @@ def _patterns(one: Recorded, joints: Sequence[str]) -> Iterator[tuple[str, str, 
 
 
 def _plain(joint: str) -> str:
-    """A joint's name without the words that say nothing."""
+    """A joint's name without generic words."""
     return "_".join(word for word in re.split(r"[_\s]+", joint) if word.lower() not in GENERIC)
 
 
 def joints_of(own: Sequence[str], recorded: Sequence[str], told: bool) -> dict[str, str]:
-    """The recording's name of every joint of the robot that was recorded, in the robot's order."""
+    """The recording's name of every recorded joint of the robot, in the robot's order."""
     if not told:
         inside = sorted(recorded, key=int)
         return dict(zip(own, inside, strict=False)) if len(inside) <= len(own) else {}

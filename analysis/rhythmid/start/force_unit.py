@@ -1,4 +1,4 @@
-"""The unit of what drives: a model has one, so that the commanded and the measured effort should be of the same."""
+"""Unit of the driving force: the model has one unit, so the commanded and the measured effort should have the same."""
 
 from collections.abc import Sequence
 
@@ -10,11 +10,11 @@ MODELLED = (
     "effort",
     "input",
     "forcing",
-)  # roles whose unit the model has, as the balance of forces takes them
+)  # roles whose unit is the model's, as used in the force balance
 
 
 def of_one_unit(commanded: Sequence[Known], sensed: Sequence[Known]) -> tuple[list[Known], list[Known]]:
-    """Those commanded and measured efforts that have one of their unit on the other side; all of them where none has."""
+    """The commanded and measured efforts whose unit also occurs on the other side; all of them where there are none."""
     pairs = [(first, second) for first in commanded for second in sensed if _agree(first.one, second.one)]
     if not pairs:
         return list(commanded), list(sensed)
@@ -23,12 +23,12 @@ def of_one_unit(commanded: Sequence[Known], sensed: Sequence[Known]) -> tuple[li
 
 
 def matching(able: Sequence[Known], picked: Recorded) -> list[Known]:
-    """Those of the unit of what was picked; all of them where none is."""
+    """The numbers with the unit of `picked`; all of them where there are none."""
     return [one for one in able if _agree(one.one, picked)] or list(able)
 
 
 def doubt_of_units(command: Recorded, effort: Recorded) -> str:
-    """What is doubtful about a command that is not in the measured effort's unit, which is the model's; empty where it is."""
+    """Doubt about a command that is not in the unit of the measured effort, which is the model's; empty where it is."""
     if _agree(command, effort):
         return ""
     asked, measured = (driving_unit_of(one) or "no known unit" for one in (command, effort))
@@ -36,6 +36,6 @@ def doubt_of_units(command: Recorded, effort: Recorded) -> str:
 
 
 def _agree(first: Recorded, second: Recorded) -> bool:
-    """Whether two efforts are of one unit; one that nothing tells is that of a force or torque."""
+    """Whether two efforts have the same unit; an unknown unit counts as that of a force or torque."""
     units = {driving_unit_of(one) for one in (first, second)}
     return len(units) == 1 or ("" in units and not units & ELECTRICAL.keys())

@@ -1,4 +1,4 @@
-"""Which of several joints is looked at: the one that was asked for, else the one that moves most."""
+"""Selects the joint to identify among several: the requested one, else the one that moves most."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -10,13 +10,13 @@ from rhythmid.record.inventory import Recorded
 from rhythmid.record.standstill import FLICKER
 from rhythmid.start.meaning import Meaning, Quantity, joint_of_column, same_joint, words_of
 
-CLOSE_MOTION = 0.7  # of the motion of the joint that moves most, from which another one is worth a question
+CLOSE_MOTION = 0.7  # ratio to the largest motion of a joint above which the user is asked about another joint
 
 
 @dataclass(frozen=True)
 class Joint:
-    """The joint that is looked at, empty where there is but one, how much every joint moved (standard deviation), and the names of `further`
-    joints of which no motion was recorded."""
+    """The selected joint (empty where there is only one), the motion of every joint (standard deviation), and the
+    names of `further` joints without a recorded motion."""
 
     name: str = ""
     motion: dict[str, float] = field(default_factory=dict)
@@ -24,24 +24,26 @@ class Joint:
 
     @property
     def others(self) -> list[str]:
-        """The other joints, those that moved most first."""
+        """The other joints, in descending order of motion."""
         return sorted(
             (name for name in self.motion if name != self.name), key=lambda name: -self.motion[name]
         )
 
     def includes(self, one: Recorded, meaning: Meaning) -> bool:
-        """Whether a number is this joint's, or not one of another joint's."""
+        """Whether a number belongs to this joint, or to no other joint."""
         if not self.name or meaning.joint == self.name:
             return True
         if meaning.joint in self.motion:
             return False
-        said = {*words_of(one.topic), *words_of(meaning.joint)}  # tau_cal_3 is of joint 3, whatever cal is
+        # tau_cal_3 belongs to joint 3, whatever cal means
+        said = {*words_of(one.topic), *words_of(meaning.joint)}
         if self._telling(self.name) <= said:
             return True
         return not any(self._telling(other) <= said for other in (*self.others, *self.further))
 
     def _telling(self, name: str) -> set[str]:
-        """Words of a joint's name that are not in the names of all; the whole name where these are but numbers, which count other things, too."""
+        """Words of a joint's name that not all joints share; the whole name where these are only numbers, which
+        have other uses, too."""
         common = set.intersection(*(set(words_of(one)) for one in self.motion))
         words = set(words_of(name))
         rest = words - common
@@ -55,12 +57,13 @@ def joint_of(
     ask: Callable[[str, Sequence[str]], int],
     place: str,
 ) -> Joint:
-    """The joint to look at; of `still` nothing moves. Raises InputError where none is called `wanted`, or that one stands still."""
+    """The joint to identify; the numbers in `still` are constant. Raises InputError where none is called `wanted`,
+    or that one is at rest."""
     motion: dict[str, float] = {}
     order: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
     for quantity in order:
         able = _measured(known, quantity)
-        if wanted is None:  # what shows a few values only is no motion where another one is
+        if wanted is None:  # a number with a few values only is no motion if there is another one
             able = [(one, meaning) for one, meaning in able if shows_motion(one)] or able
         if able and not motion:
             motion = {meaning.joint: 0.0 for _, meaning in _measured(still, quantity)}
@@ -89,17 +92,18 @@ def joint_of(
 
 
 def _with_words(wanted: str, names: Iterable[str]) -> list[str]:
-    """The names that begin with the words of another one, as swing_sensor does with swing, else those that hold them, as arm_pitch
-    does pitch."""
+    """The names that start with the words of another one, as swing_sensor with swing; else those that contain them,
+    as arm_pitch contains pitch."""
     words = words_of(wanted)
     holding = [name for name in names if words and f" {' '.join(words)} " in f" {' '.join(words_of(name))} "]
     return [name for name in holding if words_of(name)[: len(words)] == words] or holding
 
 
 def _further(name: str, known: Sequence[tuple[Recorded, Meaning]], asked: bool = False) -> frozenset[str]:
-    """Joints whose columns are called as those of the joint `name` but for the first words: beside Swing Ms, Boom Ms is of the boom.
+    """Joints whose columns have the names of those of the joint `name` except for the first words: beside Swing Ms,
+    Boom Ms is of the boom.
 
-    Where the joint was asked for, those too whose columns are called alike among themselves.
+    Where the joint was requested (`asked`), also those whose columns have matching names among themselves.
     """
     own = words_of(name)
     heads: dict[tuple[str, ...], set[tuple[str, ...]]] = {}
@@ -117,8 +121,8 @@ def _further(name: str, known: Sequence[tuple[Recorded, Meaning]], asked: bool =
 def _motion_of_untold(
     known: Sequence[tuple[Recorded, Meaning]], still: Sequence[tuple[Recorded, Meaning]]
 ) -> dict[str, float]:
-    """How much joints moved of which no name says a quantity, such as FR_2_actual beside FR_2_target: what a controller is asked for and
-    measures of every joint is its motion."""
+    """Motion of joints without a named quantity, such as FR_2_actual beside FR_2_target: the quantity that a
+    controller commands and measures at every joint is its motion."""
     asked = {meaning.joint for _, meaning in (*known, *still) if meaning.commanded is True}
     motion: dict[str, float] = {}
     for one, meaning in (*known, *still):
@@ -130,7 +134,7 @@ def _motion_of_untold(
 
 
 def shows_motion(one: Recorded) -> bool:
-    """Whether it has more values than a sensor shows of a machine at rest."""
+    """Whether it has more distinct values than a sensor of a machine at rest."""
     return len(np.unique(one.value[np.isfinite(one.value)])) > FLICKER
 
 

@@ -1,4 +1,4 @@
-"""What is known of a recorded number while roles are guessed, and what plays one."""
+"""Knowledge about recorded numbers while roles are assigned, and the choice for a role."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -11,13 +11,13 @@ from rhythmid.start.meaning import Meaning, Quantity
 
 Ask = Callable[
     [str, Sequence[str]], int
-]  # a question and its possible answers, the best first -> number of the answer
-CLOSE_WORTH = 0.7  # of the best candidate's worth, from which another one is worth a question
+]  # a question and its possible answers, best first -> index of the answer
+CLOSE_WORTH = 0.7  # ratio to the best candidate's score above which the user is asked about another one
 
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """What plays a role, why, what else might, and what is doubtful about it."""
+    """The choice for a role, its reason, the alternatives, and doubts about it."""
 
     recorded: Recorded
     reason: str
@@ -36,7 +36,7 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """A number with its meaning, and what is doubtful about it where the data say it."""
+    """A number with its meaning, and doubts from the data."""
 
     one: Recorded
     meaning: Meaning
@@ -44,18 +44,18 @@ class Known:
 
     @property
     def quantity(self) -> Quantity | None:
-        """What it is, None where nothing says it."""
+        """Its quantity; None where nothing states it."""
         return self.meaning.quantity
 
     def taken_for(
         self, quantity: Quantity, reason: str = "the data say so", commanded: bool | None = None
     ) -> "Known":
-        """The number as what the data say that it is; `commanded` where they say that, too."""
+        """The number with the quantity that the data support; `commanded` where they support that, too."""
         asked = self.meaning.commanded if commanded is None else commanded
         return replace(self, meaning=replace(self.meaning, quantity=quantity, reason=reason, commanded=asked))
 
     def doubted(self, doubt: str) -> "Known":
-        """The number with what is doubtful about it."""
+        """The number with a doubt added."""
         return replace(self, doubt=doubt)
 
     def of_base(self) -> "Known":
@@ -64,22 +64,22 @@ class Known:
 
 
 def pick(question: str, ranked: Sequence[tuple[float, Recorded]], ask: Ask) -> int:
-    """The best of candidates in falling order of worth; asked for where others are close."""
+    """The best of the candidates, which are in descending order of score; the user is asked where others are close."""
     close = [one for worth, one in ranked if worth >= CLOSE_WORTH * ranked[0][0]]
     return ask(question, [str(one) for one in close]) if len(close) > 1 else 0
 
 
 def ranked_by_worth(scored: Sequence[tuple[float, Known]]) -> list[tuple[float, Recorded]]:
-    """Candidates in falling order of worth."""
+    """Candidates in descending order of score."""
     return [(worth, one.one) for worth, one in sorted(scored, key=lambda pair: -pair[0])]
 
 
 def strongest(able: Sequence[Known], reason: str) -> Choice:
-    """Of several candidates the one that moves most."""
+    """The candidate that moves most."""
     ranked = sorted(able, key=lambda one: -float(np.nanstd(one.one.value)))
     return chosen(ranked[0], f"{reason}: {ranked[0].meaning.reason}", [one.one for one in ranked[1:]])
 
 
 def chosen(picked: Known, reason: str, others: Sequence[Recorded] = ()) -> Choice:
-    """What plays a role, with what is doubtful about it."""
+    """The choice for a role, with the doubts about it."""
     return Choice(picked.one, reason, tuple(others), (picked.doubt,) if picked.doubt else ())

@@ -1,17 +1,17 @@
-"""Entries of lists without names, beside a list of the same message type that names its entries: `position[2]` is of the joint that stands
-third there."""
+"""Unnamed list entries beside a list of the same message type with names: `position[2]` belongs to the joint that
+is third in that list."""
 
 from collections import defaultdict
 from dataclasses import replace
 
 from rhythmid.record.inventory import Inventory, Recorded
 
-NUMBER = "#"  # what the joint of an entry without a name begins with
+NUMBER = "#"  # start of the name of an unnamed entry's joint
 
 
 def with_listed_joints(found: Inventory) -> Inventory:
-    """The inventory with the joint of every such entry; as it is where the named lists of a type differ in length from the list, or in their
-    names."""
+    """The inventory with the joint of every such entry. It is unchanged where the named lists of a type differ in
+    length from the list, or in their names."""
     names: dict[str, set[tuple[str, ...]]] = defaultdict(set)
     for topic, joints in _joints_by_topic(found).items():
         if not any(joint.startswith(NUMBER) for joint in joints):
@@ -30,7 +30,7 @@ def with_listed_joints(found: Inventory) -> Inventory:
 
 
 def _joints_by_topic(found: Inventory) -> dict[tuple[str, str], tuple[str, ...]]:
-    """The joints of every topic and type, in the order in which its messages list them."""
+    """The joints of every topic and type, in the order of their messages."""
     order: dict[tuple[str, str], list[str]] = defaultdict(list)
     for one in found.listed:
         if one.joint and one.joint not in order[one.topic, one.type]:

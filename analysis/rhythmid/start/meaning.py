@@ -1,4 +1,5 @@
-"""What a recorded number means by its name, unit and message type: which quantity, and whether it was asked for or measured."""
+"""Meaning of a recorded number from its name, unit and message type: its quantity, and whether it is commanded or
+measured."""
 
 import re
 import unicodedata
@@ -33,13 +34,13 @@ DEVICES: dict[str, Quantity] = {
     "encoder": "position",
     "encoders": "position",
     "enc": "position",
-    "load": "effort",  # a load cell's; the angle of a load is no effort
-}  # what a device measures, where no word says what it is of
+    "load": "effort",  # of a load cell; the angle of a load is no effort
+}  # quantities measured by a device, where no word states the quantity
 GAUGES = frozenset(
     "cell cells gauge gauges strain".split()
-)  # whose volts are a bridge's, which drives nothing
-PULSED = frozenset("servo servos esc throttle pulse pulses".split())  # what is sent as the width of a pulse
-LETTERS: dict[str, Quantity] = {  # what one letter stands for by custom, where nothing else is said
+)  # whose volts are those of a bridge, and no driving signal
+PULSED = frozenset("servo servos esc throttle pulse pulses".split())  # sent as the width of a pulse
+LETTERS: dict[str, Quantity] = {  # conventional meaning of a single letter, where nothing else is stated
     "q": "position", "x": "position", "y": "position", "z": "position", "v": "velocity", "w": "velocity", "a": "acceleration",
     "u": "effort", "f": "effort", "i": "effort", "t": "effort",
 }  # fmt: skip
@@ -48,17 +49,17 @@ COMMANDED = frozenset(
     "demand demands demanded excitation request requests requested soll sollwert consigne consigna referencia riferimento".split()
 )
 COMMANDED_LETTERS = frozenset("u r".split())
-# a controller's output, of an effort; the short ones of a force are a contact's and a centre's
+# a controller's output, for an effort; the short words for a force also denote a contact's or a centre's
 CONTROLLED = frozenset("controller control ctrl contr ctl".split())
 CONTROLLED_SHORT = frozenset("con ctr".split())
 COMMANDED_COLUMNS = frozenset(
     "action actions".split()
-)  # what a policy asked for; of a topic it is a ROS action
+)  # commanded by a policy; in a topic it denotes a ROS action
 MEASURED = frozenset(
     "meas measured sensed act actual state states observation feedback fb est estimated present real raw filt filtered smoothed response "
     "encoder encoders enc ist istwert mesure medido medida misurato".split()
 )
-# a reading of a sensor, of several efforts the one of the machine: not one that was filtered, estimated or modelled
+# a sensor reading; among several efforts it is preferred to one that was filtered, estimated or modelled
 READ = frozenset("meas measured act actual feedback fb present sensed".split())
 PLACES = frozenset(
     "motor load link gear rotor shaft sensor imu camera vicon mocap optitrack laser lidar".split()
@@ -67,15 +68,14 @@ FORCING = frozenset("forcing pump pumping disturbance perturbation external".spl
 BASE = frozenset(
     "base table ground shaker platform floor road terrain foundation seismic earthquake quake".split()
 )
-SHAKEN = frozenset(
-    "excitation exc shaking vibration".split()
-)  # a motion that is called so is one of the base
-DRIVING = frozenset("input in stimulus ctrl control drive".split())  # what drives, where no quantity is said
+SHAKEN = frozenset("excitation exc shaking vibration".split())  # words for a motion of the base
+# driving signals, where no quantity is stated
+DRIVING = frozenset("input in stimulus ctrl control drive".split())
 FORCES = frozenset("force forces wrench".split())  # of a contact as well as of an actuator
 GENERIC = frozenset(
     "dof joint joints motor data robot array value values actuator axis trajectory controller controllers in out input output".split()
 )
-JOINT = frozenset("joint joints".split())  # what drivers add to a joint's name at will
+JOINT = frozenset("joint joints".split())  # added by drivers to joint names arbitrarily
 ROTARY = frozenset(
     "angle angles theta phi alpha torque torques tor torq tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
     "qpos qvel knee hip ankle thigh calf shoulder elbow wrist arm pan tilt roll pitch yaw pendulum winkel drehmoment drehzahl angulo "
@@ -88,18 +88,18 @@ LINEAR = frozenset(
 POSED = frozenset(
     "des desired ref refs reference references target targets goal goals setpoint setpoints sp soll sollwert "
     "consigne consigna referencia riferimento".split()
-)  # of a motion, where nothing else is said
+)  # for a motion, where nothing else is stated
 ELECTRICAL = {
     "V": "voltage volt volts spannung tensione tensao",
     "A": "current currents cur iq amp amps i strom corriente corrente courant",
     "1": "pwm duty",
 }
 IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "tf2_msgs/", "trajectory_msgs/", "control_msgs/")
-# what a computer counts or sets, which neither drives nor is followed
+# values that a computer counts or sets; they neither drive nor follow
 COUNTED = frozenset(
     "counter counters count counts id ids flag flags active enable enabled bit bits index idx seq sequence mask crc".split()
 )
-NO_EFFORT = COUNTED | frozenset("state states tcp tool flange pose".split())  # the place of a tool, too
+NO_EFFORT = COUNTED | frozenset("state states tcp tool flange pose".split())  # including the pose of a tool
 WITH_MEANING = frozenset().union(
     COMMANDED, COMMANDED_COLUMNS, CONTROLLED, MEASURED, GENERIC, FORCING, BASE, SHAKEN, DRIVING, DEVICES, *WORDS.values()
 )  # fmt: skip
@@ -108,7 +108,8 @@ IGNORED = frozenset("temp temperature battery power error err status mode".split
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a number is by its name: None where nothing is said. `reason` is a phrase, `certain` whether a word or unit says it."""
+    """Meaning of a number by its name: None where nothing is stated. `reason` is a phrase, `certain` whether a word
+    or unit states it."""
 
     quantity: Quantity | None
     commanded: bool | None
@@ -120,19 +121,19 @@ class Meaning:
 
 
 def words_of(text: str) -> list[str]:
-    """Words of a name in lower case and without accents: parted at capitals, digits, dots, slashes and underscores."""
+    """Words of a name in lower case and without accents: split at capitals, digits, dots, slashes and underscores."""
     bare = "".join(one for one in unicodedata.normalize("NFKD", text) if not unicodedata.combining(one))
     apart = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", bare)
     return re.findall(r"[a-z]+|\d+", apart.lower())
 
 
 def is_word(word: str) -> bool:
-    """Whether something is known of a word, so that it is no name."""
+    """Whether a word has a known meaning, so that it is no name."""
     return word in WITH_MEANING
 
 
 def meaning_of(one: Recorded) -> Meaning:
-    """What a recorded number means by what names it."""
+    """Meaning of a recorded number by its name, unit and type."""
     near, far = words_of(one.said), words_of(one.topic)
     quantity, reason, certain = _quantity(one, near, far)
     every = {*near, *far}
@@ -164,22 +165,22 @@ def meaning_of(one: Recorded) -> Meaning:
 
 
 def is_ignored(one: Recorded) -> bool:
-    """Whether its name says that it is neither a motion nor what drives one."""
+    """Whether its name says that it is neither a motion nor a driving signal."""
     return bool({*words_of(one.said), *words_of(one.topic)} & IGNORED)
 
 
 def is_counted(one: Recorded) -> bool:
-    """Whether its name says that it is a number that a computer counts or sets."""
+    """Whether its name says that a computer counts or sets it."""
     return bool({*words_of(one.said), *words_of(one.topic)} & COUNTED)
 
 
 def is_no_effort(one: Recorded) -> bool:
-    """Whether its name says that it is something else than what drives a machine."""
+    """Whether its name says that it is no driving signal."""
     return bool({*words_of(one.said), *words_of(one.topic)} & NO_EFFORT)
 
 
 def rotary_of(one: Recorded) -> tuple[bool | None, str]:
-    """Whether the quantity turns (True) or slides (False), and the word or unit that says it."""
+    """Whether the quantity is rotational (True) or translational (False), and the word or unit that says so."""
     if one.unit in ("rad", "rad/s", "rad/s^2", "N*m"):
         return True, f"its unit is {one.written_unit}"
     if one.unit in ("m", "m/s", "m/s^2", "N"):
@@ -195,7 +196,7 @@ def rotary_of(one: Recorded) -> tuple[bool | None, str]:
 
 
 def force_unit_of(one: Recorded) -> str:
-    """Unit of what drives, by its heading or a word that says what a motor is fed with; empty where neither does."""
+    """Unit of the driving signal, by its heading or a word for a motor's supply; empty where neither states it."""
     if one.unit:
         return one.unit
     words = {*words_of(one.said), *words_of(one.topic)}
@@ -203,48 +204,48 @@ def force_unit_of(one: Recorded) -> str:
 
 
 def tells_unit(one: Recorded) -> bool:
-    """Whether a heading or the type of a ROS message, which is in SI units by REP 103, tells its unit."""
+    """Whether its unit is stated by a heading or by a ROS message type, which is in SI units by REP 103."""
     return bool(one.unit) or one.type.startswith(IN_SI)
 
 
 def is_lone_v(one: Recorded) -> bool:
-    """Whether nothing but a `v` names it: a velocity, or the voltage that drives."""
+    """Whether its only name is `v`: a velocity, or a driving voltage."""
     return words_of(one.said) == ["v"] and not one.unit
 
 
 def driving_unit_of(one: Recorded) -> str:
-    """Unit of what drives, where a `v` can be a voltage only."""
+    """Unit of the driving signal, where `v` can only be a voltage."""
     return force_unit_of(one) or ("V" if is_lone_v(one) else "")
 
 
 def poses(one: Recorded) -> bool:
-    """Whether its name says that it is what a motion is to become: a target, a set point, an `r` that is no side."""
+    """Whether its name denotes a reference of a motion: a target, a set point, an `r` that does not mean right."""
     return bool({*words_of(one.said), *words_of(one.topic)} & POSED) or words_of(one.said) == ["r"]
 
 
 def says_that_it_drives(one: Recorded) -> bool:
-    """Whether its name says that it drives, of whatever quantity."""
+    """Whether its name says that it drives the machine, whatever its quantity."""
     return bool({*words_of(one.said), *words_of(one.topic)} & DRIVING)
 
 
 def says_base(one: Recorded) -> bool:
-    """Whether a word of its name says that it is of the base."""
+    """Whether a word of its name refers to the base."""
     return bool({*words_of(one.said), *words_of(one.topic)} & BASE)
 
 
 def names_a_place(one: Recorded) -> bool:
-    """Whether its name says where or by what it was measured."""
+    """Whether its name states the location or the device of the measurement."""
     return bool({*words_of(one.said), *words_of(one.topic)} & PLACES)
 
 
 def letter_of(one: Recorded) -> str:
-    """The one letter that stands for a quantity in its name; empty where there is none, or several."""
+    """The single letter for a quantity in its name; empty where there is none, or several."""
     letters = [word for word in words_of(one.said) if word in LETTERS]
     return letters[0] if letters else ""
 
 
 def doubt_of_letter(one: Recorded) -> str:
-    """What is doubtful about a quantity that one letter of a name stands for, beside words that nothing is known of; empty where none is.
+    """Doubt about a quantity that is denoted by one letter of a name beside unknown words; empty where there are none.
 
     A joint's name is such a word, too.
     """
@@ -258,13 +259,14 @@ def doubt_of_letter(one: Recorded) -> str:
 
 
 def differ_in_number(one: Recorded, other: Recorded) -> bool:
-    """Whether two names differ in a number only, as those of two joints or sensors do."""
+    """Whether two names differ only in a number, like those of two joints or sensors."""
     first, second = ([word for word in words_of(each.said) if not word.isdigit()] for each in (one, other))
     return first == second and one.said != other.said
 
 
 def of_one_array(one: Recorded, other: Recorded) -> bool:
-    """Whether two columns are entries of one array, or are called measured and differ in a number only: one quantity of two joints."""
+    """Whether two columns are entries of one array, or are named as measured and differ only in a number: one
+    quantity of two joints."""
     if one.topic or other.topic or one.column == other.column:
         return False
     first, second = (re.sub(r"\[\d+\]", "[]", each.column) for each in (one, other))
@@ -272,23 +274,23 @@ def of_one_array(one: Recorded, other: Recorded) -> bool:
 
 
 def same_joint(one: str, other: str) -> bool:
-    """Whether two names are of one joint: with or without the word joint, in whatever case and with whatever between the words."""
+    """Whether two names denote the same joint: ignoring the word joint, case, and separators."""
     first, second = ([word for word in words_of(each) if word not in JOINT] for each in (one, other))
     return bool(first) and first == second
 
 
 def says_who_asks(one: Recorded) -> bool:
-    """Whether a word of its name says that it was asked for, or that it was measured."""
+    """Whether a word of its name says that it was commanded, or that it was measured."""
     return bool({*words_of(one.said), *words_of(one.topic)} & (COMMANDED | MEASURED))
 
 
 def says_it_was_read(one: Recorded) -> bool:
-    """Whether a word of its name says that a sensor read it."""
+    """Whether a word of its name says that it is a sensor reading."""
     return bool({*words_of(one.said), *words_of(one.topic)} & READ)
 
 
 def _controlled(one: Recorded, near: list[str]) -> set[str]:
-    """Words of an effort's name that say that a controller made it; none where one says that it was read."""
+    """Words of an effort's name for a controller's output; empty where a word says that it was measured."""
     words = set(near)
     if words & READ:
         return set()
@@ -328,7 +330,7 @@ def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity 
 
 
 def _motion_word(near: list[str]) -> tuple[str, Quantity] | None:
-    """The word of a name that says a motion, and which; None where the last one that says a quantity says an effort."""
+    """The word for a motion in the name, and its quantity; None where the last word for a quantity means an effort."""
     for word in reversed(near):
         for quantity, known in WORDS.items():
             if word in known:
@@ -341,7 +343,8 @@ def _one(words: list[str], known: Collection[str]) -> str:
 
 
 def joint_of_column(said: str, side: str = "", names: Collection[str] = ()) -> str:
-    """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; `names` are words that are names here."""
+    """The part of a name that distinguishes a column from others of the same quantity: `3` of dof_pos[3], `knee` of
+    knee_pos. `names` are words that are names here."""
     known = WITH_MEANING | set(LETTERS)
     words = words_of(said)
     if set(words) & (WORDS["effort"] - FORCES):

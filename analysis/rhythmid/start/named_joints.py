@@ -1,5 +1,5 @@
-"""Columns of joints that are called by a word that also says something else: `velocity_Rotation` is a velocity, of the joint `rotation`,
-and `tau_SP` beside `tau_ELBOW` a torque of the joint `sp`, not a set point."""
+"""Columns of joints with a name that also means something else: `velocity_Rotation` is the velocity of the joint
+`rotation`, and `tau_SP` beside `tau_ELBOW` the torque of the joint `sp`, not a set point."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -20,12 +20,14 @@ from rhythmid.start.meaning import (
 NAMING: tuple[Quantity, ...] = (
     "position",
     "effort",
-)  # said beside a word of motion, they tell that it is a name
-PEERS = 2  # names of joints beside it, each with all of its quantities, from which a word is another one: a single one may be a sensor's
+)  # beside a word for a motion, they show that it is a name
+# least number of joint names beside a word, each with all of its quantities, that make the word a joint name: a
+# single one may be a sensor's
+PEERS = 2
 
 
 def with_joints(found: Inventory) -> Inventory:
-    """The inventory with the joint of every column that bears the name of one that could be taken for a quantity."""
+    """The inventory with the joint of every column whose joint name could be taken for a quantity."""
     every = (*found.recorded, *found.constant)
     names = _joints_among(one.said for one in every if one.column)
     if not names:
@@ -37,10 +39,10 @@ def with_joints(found: Inventory) -> Inventory:
 
 
 def _joints_among(headings: Iterable[str]) -> frozenset[str]:
-    """Words of motion that are names.
+    """Words for motions that are used as names.
 
-    Such a word stands beside words of several quantities, as in position_Rotation and torque_Rotation, or in the place of a word that
-    is a name only, as in command_Rotation and command_Pitch.
+    Such a word occurs beside words for several quantities, as in position_Rotation and torque_Rotation, or in place
+    of a word that is only a name, as in command_Rotation and command_Pitch.
     """
     split = [words_of(one) for one in headings]
     known = {tuple(words) for words in split}
@@ -52,8 +54,8 @@ def _joints_among(headings: Iterable[str]) -> frozenset[str]:
 
 
 def _is_one_of_many(word: str, known: set[tuple[str, ...]]) -> bool:
-    """Whether a word stands where names do, beside the same quantities as each of several of them: SP as in q_SP, tau_SP, q_KNEE, tau_KNEE,
-    q_HIP and tau_HIP, with nothing that is called q or tau alone."""
+    """Whether a word occurs in place of names, with the same quantities as several of them: SP in q_SP, tau_SP,
+    q_KNEE, tau_KNEE, q_HIP and tau_HIP, without columns called only q or tau."""
     if not (is_word(word) or word in CONTROLLED_SHORT) or word in LETTERS:
         return False
     frames = {
@@ -74,7 +76,7 @@ def _is_one_of_many(word: str, known: set[tuple[str, ...]]) -> bool:
 
 
 def _quantity_of(words: Iterable[str]) -> Quantity | None:
-    """The quantity that words say, or one letter by custom."""
+    """The quantity denoted by words, or by one letter by convention."""
     words = list(words)
     said = sorted(_said(words, ""))
     return said[0] if said else next((LETTERS[one] for one in words if one in LETTERS), None)
@@ -100,17 +102,17 @@ def _in_place_of_name(word: str, known: set[tuple[str, ...]]) -> bool:
 
 
 def _is_name(word: str) -> bool:
-    """Whether a word says nothing else than which joint it is."""
+    """Whether a word only identifies a joint."""
     return not word.isdigit() and word not in LETTERS and bool(joint_of_column(word))
 
 
 def _said(words: Iterable[str], but: str) -> set[Quantity]:
-    """Quantities that the other words say."""
+    """Quantities denoted by the other words."""
     return {quantity for quantity, known in WORDS.items() for one in words if one != but and one in known}
 
 
 def _named(one: Recorded, names: frozenset[str]) -> Recorded:
-    """The column with its joint, and without the joint's name in what is said of it where another word says the quantity."""
+    """The column with its joint, and without the joint's name in `said` where another word states the quantity."""
     words = words_of(one.said)
     own = names & set(words)
     if not one.column or not own:

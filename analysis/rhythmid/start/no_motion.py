@@ -1,4 +1,4 @@
-"""What to tell where nothing that was recorded is called a motion: what each number was taken for, and how to name one."""
+"""Message where no recorded number is named as a motion: how each number was interpreted, and how to name one."""
 
 import json
 from collections.abc import Sequence
@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from rhythmid.start.known import Known
 from rhythmid.start.meaning import words_of
 
-LISTED = 12  # numbers that the message names
+LISTED = 12  # largest number of numbers in the message
 AMBIGUOUS = frozenset(
     {"current", "currents"}
-)  # of a name without a unit: amperes, or what a quantity is at present
+)  # of a name without a unit: amperes, or the present value of a quantity
 
 
 def no_motion(known: Sequence[Known]) -> str:
-    """The complaint, in one line."""
+    """The message, in one line."""
     listed = "; ".join(f"{one.one} ({_taken_for(one)})" for one in known[:LISTED])
     more = f" and {len(known) - LISTED} more" if len(known) > LISTED else ""
     measured = [one.one for one in known if one.meaning.commanded is not True]
@@ -37,6 +37,6 @@ def no_motion(known: Sequence[Known]) -> str:
 
 
 def _taken_for(one: Known) -> str:
-    """What a number was taken for, and why."""
+    """Interpretation of a number, and its reason."""
     what = one.quantity or ("asked for" if one.meaning.commanded else "not understood")
     return f"{what}: {one.meaning.reason}" if one.meaning.reason else what

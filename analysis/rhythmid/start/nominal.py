@@ -1,4 +1,4 @@
-"""A nominal model to begin with: what the records suggest at first sight, with first guesses of all values."""
+"""A nominal model to start with: elements that the records suggest, with first guesses of all values."""
 
 import math
 from collections.abc import Sequence
@@ -20,16 +20,15 @@ from rhythmid.start.roles import Roles
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
 from rhythmid.value import Value
 
-LAW_KEPT = (
-    0.5  # share of an effort that the law of a controller may leave at most, to be taken for what made it
-)
-LEAST_DAMPING = 0.01  # of inertia times the motion's angular frequency, where the balance shows no damping
+LAW_KEPT = 0.5  # largest unexplained share of an effort for which a controller is taken as its cause
+# ratio to inertia times the motion's angular frequency, used where the balance shows no damping
+LEAST_DAMPING = 0.01
 
 
 @dataclass(frozen=True)
 class Nominal:
-    """A model to begin with, the reason for its inertia and each of its terms (by label), what was not guessed, and what is doubtful
-    about any of them (by label)."""
+    """A model to start with, the reason for its inertia and each of its terms (by label), what could not be
+    guessed, and doubts (by label)."""
 
     model: Model
     reasons: dict[str, str]
@@ -38,7 +37,7 @@ class Nominal:
 
 
 def nominal_of(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
-    """The nominal model of records whose roles were guessed; `units` are those of its force, position and inertia."""
+    """The nominal model of records with assigned roles; `units` are those of its force, position and inertia."""
     if roles.input_kind == "reference":
         return _servo(records, roles, units, catalogue)
     first = records[0]
@@ -51,7 +50,7 @@ def nominal_of(records: Sequence[Record], roles: Roles, units: Units, catalogue:
 
 
 def units_of(roles: Roles, force: str) -> Units:
-    """Units of the machine: of its position by how it moves, of its force as recorded, where that is told."""
+    """Units of the machine: of its position by the kind of its motion, of its force as recorded, where stated."""
     usual = ROTATIONAL if roles.rotary else TRANSLATIONAL
     if force in ("", usual.force):
         return usual
@@ -59,7 +58,7 @@ def units_of(roles: Roles, force: str) -> Units:
 
 
 def per_inertia(units: Units) -> Units:
-    """Units of a machine of which no force is known: forces are accelerations."""
+    """Units of a machine with unknown forces: forces are accelerations."""
     return Units(f"{units.position}/s^2", units.position, "1")
 
 
@@ -68,7 +67,7 @@ def _bare(units: Units, mass: float = 1.0, fixed: bool = False) -> Model:
 
 
 def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
-    """Force and motion were recorded: all by the balance of forces."""
+    """Model from recorded force and motion, by the force balance."""
     driver = "effort" if "effort" in roles.choices else "input"
     try:
         found = balance_of(
@@ -99,8 +98,8 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
 
 
 def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
-    """The inertia of a balance, and what is doubtful about it: none is seen that follows damper and spring within an
-    interval of the filtered motion, a sample or a tenth of the shortest period that stands out of the noise."""
+    """The inertia of a balance, and doubts about it. An inertia is not identifiable if it follows damper and spring
+    within one interval of the filtered motion: a sample, or a tenth of the shortest period above the noise."""
     found, period = law.coefficients, max(rows.period)
     doubts: list[str] = []
     if rows.steady:
@@ -122,7 +121,7 @@ def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
 def _forces(
     model: Model, law: Law, kind: str, rows: Rows, catalogue: Catalogue
 ) -> tuple[Model, dict[str, str]]:
-    """The model with what the balance shows besides the inertia."""
+    """The model with the elements besides the inertia that the balance shows."""
     found, reasons = law.coefficients, {}
     if kind == "spring":
         stiffness = found["position"]
@@ -164,7 +163,8 @@ def _forces(
 def _controller(
     records: Sequence[Record], model: Model, reasons: dict[str, str], catalogue: Catalogue
 ) -> tuple[Model, dict[str, str], str]:
-    """The model with the position controller that made the recorded effort from reference and motion, if one did."""
+    """The model with the position controller that computes the recorded effort from reference and motion, if there
+    is one."""
     law = _control_law(records)
     if law is None or law.left > LAW_KEPT:
         left = "" if law is None else f" (a proportional and a derivative gain leave {law.left:.0%} of it)"
@@ -205,7 +205,7 @@ def _control_law(records: Sequence[Record]) -> Law | None:
 
 
 def _servo(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
-    """Only reference and motion are known: a controller, all per unit of inertia."""
+    """Model where only reference and motion are known: a controller, per unit of inertia."""
     model = _bare(units, 1.0, fixed=True)
     reasons = {INERTIA: "no force is known, so all is per unit of inertia"}
     law = _servo_law(records, roles.reference_of)
@@ -235,7 +235,8 @@ def _servo(records: Sequence[Record], roles: Roles, units: Units, catalogue: Cat
 
 
 def _servo_law(records: Sequence[Record], of: str) -> Law:
-    """Gains of  acceleration = k_p (reference − position) − k_d velocity, by size alone where that comes out negative or explains next to nothing.
+    """Gains of  acceleration = k_p (reference − position) − k_d velocity, by size alone where the fit is negative
+    or explains almost nothing.
 
     The balance is solved for the reference: r = x + (a + k_d v) / k_p.
     """
@@ -245,17 +246,18 @@ def _servo_law(records: Sequence[Record], of: str) -> Law:
     frequency = scales(prepare(as_force), _bare(TRANSLATIONAL)).frequency
     usual = (
         2.0 * math.pi * max(frequency, 1.0)
-    ) * 3.0  # thrice the motion's own: a servo follows what it is asked for
+    ) * 3.0  # three times that of the motion: a servo follows its reference
     fallback = Law({"gain": usual**2 if of == "position" else usual, "velocity": 1.4 * usual}, 1.0)
     try:
         rows = Rows.of(as_force, _bare(TRANSLATIONAL))
         names = ["acceleration", "velocity", *(["position"] if of == "position" else [])]
-        names += [] if rows.steady else ["constant"]  # which alone balances a reference that never changes
+        names += [] if rows.steady else ["constant"]  # a constant alone balances a constant reference
         law = rows.fit(names, rows.delay(names))
     except InputError:
         return fallback
     lag = law.coefficients["velocity"]
-    # an inertia that follows within an interval of the filtered motion is not seen, and would only make the model stiff
+    # an inertia that follows within one interval of the filtered motion is not identifiable and would only make the
+    # model stiff
     inertial = max(law.coefficients["acceleration"], lag * max(rows.period))
     if inertial <= 0.0 or law.left > UNEXPLAINED:
         return replace(fallback, left=law.left)
@@ -263,7 +265,7 @@ def _servo_law(records: Sequence[Record], of: str) -> Law:
 
 
 def _alone(records: Sequence[Record], units: Units, catalogue: Catalogue, why: str) -> Nominal:
-    """A free decay, or a machine on a base that moves: all per unit of inertia."""
+    """Model of a free decay, or of a machine on a moving base: all per unit of inertia."""
     model = _bare(units, 1.0, fixed=True)
     reasons = {INERTIA: f"{why}, so all is per unit of inertia"}
     try:
@@ -276,7 +278,7 @@ def _alone(records: Sequence[Record], units: Units, catalogue: Catalogue, why: s
 
 
 def _as_driven(record: Record) -> Record:
-    """A free decay as one that its own inertial force drives, −a, which is what a base would be."""
+    """A free decay as a motion driven by its own inertial force −a, as by a moving base."""
     if record.input is not None:
         return record
     resting = Channel(record.output.time, np.zeros(len(record.output)), record.output.unit)
@@ -286,7 +288,7 @@ def _as_driven(record: Record) -> Record:
 def _by_size(
     records: Sequence[Record], units: Units, catalogue: Catalogue, why: str, fixed: bool = False
 ) -> Nominal:
-    """Where there is no balance: the inertia that would make such an acceleration of such a force."""
+    """Guess without a balance: the inertia for which such a force gives such an acceleration."""
     found = scales(prepare(records), _bare(units, 1.0, fixed))
     inertial = found.position * (2.0 * math.pi * found.frequency) ** 2
     mass = 1.0 if fixed else _short(found.effort / max(inertial, 1e-12))
@@ -301,5 +303,5 @@ def _by_size(
 
 
 def _short(value: float) -> float:
-    """A first guess with no more digits than it is worth."""
+    """A first guess rounded to its significant digits."""
     return float(f"{value:.3g}") + 0.0  # no negative zero

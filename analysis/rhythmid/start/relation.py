@@ -1,4 +1,4 @@
-"""How two recorded numbers go together: whether one is the integral of the other, follows it, or is driven by it."""
+"""Relations between two recorded numbers: integral, copy with a lag, or driver."""
 
 import math
 from collections.abc import Sequence
@@ -11,33 +11,37 @@ from scipy.signal import coherence, welch
 from rhythmid.record.inventory import Recorded
 
 Array = NDArray[np.float64]
-MOST_SAMPLES = 20_000  # samples that are looked at: more would tell no more
-SEGMENTS = 6  # of a record in its spectra, overlapping by half
-LATEST_ANSWER = 0.5  # s by which an answer may come after its command
-LAGS = 12  # samples of the past in an autoregression
-MOST_ROWS = 2000  # of an autoregression: more would tell no more
-PER_PERIOD = 16.0  # samples in the fastest period that carries power, for an autoregression
-POWER = 0.99  # share of the power below that frequency
-ROUNDING = 1e-8  # of a signal's variance: what an autoregression leaves below it is rounding
-GAP = 10.0  # of the median sample period: a longer step is a gap, across which no straight line is drawn
-MAIN_PART = 0.5  # of a record: a stretch without gaps that is at least so long tells enough alone
-SURE = 5.0  # times what chance makes of a prediction's gain, from which it is none: of 12 lags beyond 1 in ten millions
-GOES_ALONG = 0.5  # coherence from which two plainly have to do with each other
-HARDLY = 0.3  # coherence with the output below which a number without a name is not taken for what drives
-SURE_INTEGRAL = (
-    0.98  # correlation from which a position and a velocity belong together, where no name says so
-)
-RATIO = 0.3  # by which the slope of a position may differ from the velocity, before their units are doubted
-NEARLY = 0.8  # of the greatest correlation of any sign and lag: what an answer has, too, where its clock is a little early
-TIME_UNITS = (1.0, 1e3, 1e6, 1e9)  # of a clock in a second: s, ms, us, ns
-PACE = 0.01  # by which a clock's pace may differ from that of the stamps: oscillators differ far less, hasty stamps of a short record do not
-SAME_SIZE = (0.5, 2.0)  # ratio within which an answer is of its command's size
+MOST_SAMPLES = 20_000  # largest number of samples used: more add no information
+SEGMENTS = 6  # segments of a record for its spectra, overlapping by half
+LATEST_ANSWER = 0.5  # [s] largest lag of an answer after its command
+LAGS = 12  # past samples in an autoregression
+MOST_ROWS = 2000  # largest number of rows of an autoregression: more add no information
+PER_PERIOD = 16.0  # samples in the shortest period with power, for an autoregression
+POWER = 0.99  # share of the power below the corresponding frequency
+# share of a signal's variance below which the residual of an autoregression is rounding error
+ROUNDING = 1e-8
+GAP = 10.0  # ratio to the median sample period above which a step is a gap without interpolation
+MAIN_PART = 0.5  # share of a record that is enough for a stretch without gaps to be used alone
+# ratio to the chance level of a prediction's gain above which it is significant: with 12 lags below 1 in ten million
+SURE = 5.0
+GOES_ALONG = 0.5  # coherence above which two numbers are related
+HARDLY = 0.3  # coherence with the output below which a number without a name is no driving signal
+# correlation above which a position and a velocity belong together, where no name says so
+SURE_INTEGRAL = 0.98
+RATIO = 0.3  # relative difference of a position's slope and the velocity above which the units are doubted
+# share of the greatest correlation over all signs and lags: an answer with a slightly early clock has this, too
+NEARLY = 0.8
+TIME_UNITS = (1.0, 1e3, 1e6, 1e9)  # units of a clock per second: s, ms, us, ns
+# relative difference of a clock's rate from that of the stamps: oscillators differ far less, jittering stamps of a
+# short record about as much
+PACE = 0.01
+SAME_SIZE = (0.5, 2.0)  # ratio of sizes within which an answer has the size of its command
 
 
 @dataclass(frozen=True)
 class Follows:
-    """How well `answer` is a later copy of `command`: correlation, lag [s] and the ratio of sizes; `later` is the greatest correlation of
-    the same sign at once or later, 0 where there is none."""
+    """How well `answer` is a later copy of `command`: correlation, lag [s] and the ratio of sizes. `later` is the
+    greatest correlation with the same sign and a nonnegative lag, 0 where there is none."""
 
     correlation: float
     lag: float
@@ -51,14 +55,16 @@ class Follows:
 
     @property
     def is_answer(self) -> bool:
-        """Whether the answer may have been made to follow: neither against the command nor before it. One sine goes both ways after another."""
+        """Whether the answer may follow the command: with the same sign and not earlier. With a single sine either
+        may follow the other."""
         return self.later > 0.0 and self.later >= NEARLY * abs(self.correlation)
 
 
 def together(first: Recorded, second: Recorded) -> tuple[float, Array, Array]:
-    """Both on a common grid by straight lines: period [s], and values (n,) each; n is 0 where they do not overlap.
+    """Both on a common grid by linear interpolation: period [s], and values (n,) each; n is 0 where they do not overlap.
 
-    Where most of them is free of gaps, no more than that is looked at: a line across a gap is no motion.
+    Where a stretch without gaps covers most of the time, only that stretch is used: interpolation across a gap is
+    no motion.
     """
     (begin, end), (other_begin, other_end) = _main_part(first), _main_part(second)
     begin, end = max(begin, other_begin), min(end, other_end)
@@ -71,7 +77,7 @@ def together(first: Recorded, second: Recorded) -> tuple[float, Array, Array]:
 
 
 def runs_like_a_clock(one: Recorded) -> bool:
-    """Whether a number never goes back, and goes on with the times of its samples as a clock does that counts s, ms, us or ns."""
+    """Whether a number never decreases, and increases with the times of its samples like a clock in s, ms, us or ns."""
     time, value = _finite(one)
     if len(value) < 4 * LAGS or (np.diff(value) < 0.0).any() or np.ptp(time) == 0.0 or np.ptp(value) == 0.0:
         return False
@@ -82,7 +88,7 @@ def runs_like_a_clock(one: Recorded) -> bool:
 
 
 def _main_part(one: Recorded) -> tuple[float, float]:
-    """Begin and end [s] of the longest stretch without gaps where that is most of the record, else of the record."""
+    """Start and end [s] of the longest stretch without gaps where that is most of the record, else of the record."""
     begin, end = float(one.time[0]), float(one.time[-1])
     step = np.diff(one.time)
     usual = float(np.median(step)) if len(step) else 0.0
@@ -100,9 +106,10 @@ def _finite(one: Recorded) -> tuple[Array, Array]:
 
 
 def derivative(position: Recorded, velocity: Recorded) -> tuple[float, float]:
-    """Correlation of the slope of `position` with `velocity`, and the ratio of slope to velocity; 0, 0 where nothing is to be told.
+    """Correlation of the slope of `position` with `velocity`, and the ratio of slope to velocity; 0, 0 where they
+    cannot be computed.
 
-    The integral of the velocity is compared, so that noise is not differentiated; both without their straight lines.
+    The integral of the velocity is compared, to avoid differentiation of noise; linear trends are removed from both.
     """
     period, x, v = together(position, velocity)
     if not len(x):
@@ -118,8 +125,8 @@ def derivative(position: Recorded, velocity: Recorded) -> tuple[float, float]:
 
 
 def integrals(able: Sequence[Recorded]) -> list[tuple[Recorded, Recorded, float]]:
-    """Numbers of which one is surely the integral of the other, in one unit, with their correlation; not slopes of others among them,
-    whose own slopes are accelerations."""
+    """Pairs of numbers of which one is clearly the integral of the other, in consistent units, with their
+    correlation. Slopes of other numbers among them are left out, because their own slopes are accelerations."""
     found: list[tuple[Recorded, Recorded, float]] = []
     for first in able:
         for second in able:
@@ -133,7 +140,7 @@ def integrals(able: Sequence[Recorded]) -> list[tuple[Recorded, Recorded, float]
 
 
 def follows(command: Recorded, answer: Recorded) -> Follows:
-    """The correlation of an answer with its command at the lag where it is greatest, which may be negative."""
+    """The correlation of an answer with its command at the lag of its maximum, which may be negative."""
     period, u, y = together(command, answer)
     if not len(u) or np.ptp(u) == 0.0 or np.ptp(y) == 0.0:
         return Follows(0.0, 0.0, 0.0)
@@ -149,13 +156,14 @@ def follows(command: Recorded, answer: Recorded) -> Follows:
 
 
 def coherent(first: Recorded, second: Recorded) -> float:
-    """Share of the power of `second` that a linear law at any frequency makes of `first`: the mean coherence, weighted by that power."""
+    """Share of the power of `second` that a linear filter of `first` explains: the mean coherence, weighted by that
+    power."""
     period, u, y = together(first, second)
     if not len(u) or np.ptp(u) == 0.0 or np.ptp(y) == 0.0:
         return 0.0
     length = max(2 * LAGS, len(u) // SEGMENTS)
-    u, y = np.diff(u), np.diff(y)  # slow drifts go together by chance
-    with np.errstate(divide="ignore", invalid="ignore"):  # at frequencies without any power
+    u, y = np.diff(u), np.diff(y)  # slow drifts are correlated by chance
+    with np.errstate(divide="ignore", invalid="ignore"):  # at frequencies without power
         _, share = coherence(u, y, 1.0 / period, nperseg=length)
     _, power = welch(y, 1.0 / period, nperseg=length)
     told = np.isfinite(share)
@@ -165,26 +173,28 @@ def coherent(first: Recorded, second: Recorded) -> float:
 def drives(cause: Recorded, effect: Recorded) -> float:
     """How much better the past of both predicts `effect` than its own past alone, as a log ratio of variances.
 
-    C. W. J. Granger, Econometrica 37 (1969) 424: the cause is what helps to predict. Great where the first drives the second, near 0
-    where it does not.
+    C. W. J. Granger, Econometrica 37 (1969) 424: a cause helps to predict its effect. Large where `cause` drives
+    `effect`, near 0 where it does not.
     """
     return _gain(cause, effect)[0]
 
 
 def predicts(cause: Recorded, effect: Recorded) -> float:
-    """How many times as much as by chance the past of `cause` helps to predict `effect`: about 1 where it does not help.
+    """Gain by which the past of `cause` helps to predict `effect`, relative to chance: about 1 where it does not help.
 
-    The gain in log variance times the number of rows is chi-squared by chance, with as many degrees of freedom as there are lags.
+    By chance, the gain in log variance times the number of rows is chi-squared with as many degrees of freedom as
+    there are lags.
     """
     gain, rows = _gain(cause, effect)
     return gain * rows / LAGS
 
 
 def lead(cause: Recorded, effect: Recorded) -> tuple[float, float]:
-    """By how much [s] the one comes before the other, as far as that is less than its periods, and the standard error of that.
+    """Lead [s] of one number over the other, as far as it is shorter than its periods, and its standard error [s].
 
-    The one is fitted by a multiple k of the other and d of its rate, and d/k is told. What drives a machine of stiffness k and damping d
-    comes before its motion by that; a filter's output comes after what it is of. Errors are of the spread between parts of the record.
+    `cause` is fitted by k times `effect` plus d times its rate; the lead is d/k. The driving force of a machine
+    with stiffness k and damping d leads its motion by that much; a filter's output lags its input. The standard
+    error is that of the spread between parts of the record.
     """
     period, u, y = together(cause, effect)
     parts = [
@@ -197,7 +207,7 @@ def lead(cause: Recorded, effect: Recorded) -> tuple[float, float]:
 
 
 def _lead_of(u: Array, y: Array, period: float) -> float | None:
-    """Rate's over value's coefficient [s] of `u` as a law of `y`; None where there is none."""
+    """Ratio [s] of the rate's to the value's coefficient in the fit of `u` by `y`; None where there is none."""
     if len(u) < LAGS or np.ptp(y) == 0.0:
         return None
     rate = (y[2:] - y[:-2]) / (2.0 * period)
@@ -207,12 +217,12 @@ def _lead_of(u: Array, y: Array, period: float) -> float | None:
 
 
 def goes_along(one: Recorded, other: Recorded) -> bool:
-    """Whether a channel plainly has to do with another one: by coherence, or as what helps to predict it."""
+    """Whether a channel is clearly related to another one: by coherence, or because it helps to predict it."""
     return coherent(one, other) >= GOES_ALONG or predicts(one, other) >= SURE
 
 
 def _gain(cause: Recorded, effect: Recorded) -> tuple[float, int]:
-    """Gain of a prediction in log variance, and the rows by which it was told."""
+    """Gain of a prediction in log variance, and the number of rows used."""
     period, u, y = together(cause, effect)
     if not len(u) or np.ptp(u) == 0.0 or np.ptp(y) == 0.0:
         return 0.0, 0

@@ -1,7 +1,8 @@
-"""From recordings of a robot and its MJCF or URDF file to the signals.yaml and model.yaml of a machine of several joints.
+"""Drafts signals.yaml and model.yaml of a machine with several joints from recordings of a robot and its MJCF or
+URDF file.
 
-Of the families of channels the one that holds measured positions is the output; measured forces are the effort, and positions that were
-asked for the references.
+Among the families of channels, the one with measured positions is the output. Measured forces are the effort, and
+commanded positions the references.
 """
 
 import json
@@ -24,8 +25,8 @@ from rhythmid.start.families import Family, families_of, joints_of
 from rhythmid.start.meaning import Quantity, meaning_of, says_it_was_read
 from rhythmid.start.written import GUESSED, as_guessed, comment, time_of
 
-LITTLE = 0.02  # share of the effort that a first guess of the viscous damping takes
-# first guess of a controller whose gains nobody tells: this frequency [Hz] and damping ratio with the inertia of the joint
+LITTLE = 0.02  # share of the effort assigned to viscous damping as a first guess
+# first guess for a controller with unknown gains: this frequency [Hz] and damping ratio with the inertia of the joint
 STIFF, DAMPED = 3.0, 0.7
 
 
@@ -50,16 +51,17 @@ class RobotStart:
 def start_robot(
     sources: Sequence[str | Path], body: Path, out: Path, rate: float | None, catalogue: Catalogue
 ) -> RobotStart:
-    """Look at recordings of a robot and guess which channels are those of its joints.
+    """Inspect recordings of a robot and guess the channels of its joints.
 
     Parameters
     ----------
     sources : bags or tables of one layout.
     body : the robot's MJCF (.xml) or URDF file.
-    out : folder of the files that will be written, from which the model names the robot's file.
+    out : folder for the files; the model names the robot's file relative to it.
     rate : of a table without a time [Hz].
 
-    Raises InputError, one line, where no position of a joint of the robot was recorded, or neither an effort nor a reference.
+    Raises InputError, one line, where no position of a joint of the robot was recorded, or neither an effort nor a
+    reference.
     """
     robot = MujocoBody.load(body, contacts=False)
     found = inventory(sources[0], rate)
@@ -101,7 +103,7 @@ def start_robot(
         for name, one in records[0].joints.items()
     }
     known = robot, body, joints, speeds, sizes, reference is not None
-    Machine.from_text(_model(str(body.resolve()), *known), Path(), catalogue)  # `out` need not be there yet
+    Machine.from_text(_model(str(body.resolve()), *known), Path(), catalogue)  # `out` need not exist yet
     model = _model(os.path.relpath(body.resolve(), out.resolve()), *known)
     idle = [name for name in robot.joints if name not in joints]
     doubts += [f"held at zero, because not recorded: {', '.join(idle)}"] if idle else []
@@ -123,7 +125,8 @@ def _chosen(
 
 
 def _beside(families: Sequence[Family], quantity: Quantity, commanded: bool, output: Family) -> Family | None:
-    """The first family of this quantity that has every joint of the output's; a command of which nothing more is said is a position."""
+    """The first family of this quantity with all joints of the output; a command without a stated quantity is a
+    position."""
     return next(_all_beside(families, quantity, commanded, output), None)
 
 
@@ -140,7 +143,7 @@ def _all_beside(
 
 
 def _effort(families: Sequence[Family], output: Family) -> tuple[Family | None, list[Family]]:
-    """The effort that was not asked for, one that a sensor read before others, and the others."""
+    """The effort that was not commanded, preferably a sensor reading, and the other efforts."""
     able = sorted(
         _all_beside(families, "effort", False, output), key=lambda one: not says_it_was_read(one.first)
     )
@@ -148,7 +151,7 @@ def _effort(families: Sequence[Family], output: Family) -> tuple[Family | None, 
 
 
 def _doubts_of_effort(effort: Family | None, others: Sequence[Family], command: Family | None) -> list[str]:
-    """What is doubtful about the choice among several efforts."""
+    """Doubts about the choice among several efforts."""
     if effort is None:
         return []
     if effort is command:
@@ -182,7 +185,7 @@ def _signals(
     forward: Family | None,
     of_effort: Sequence[str],
 ) -> tuple[str, list[str]]:
-    """The text of signals.yaml, and what is doubtful about it."""
+    """The text of signals.yaml, and doubts about it."""
     bag, doubts = found.is_bag, list[str]()
     chosen = {"output": output.first} | ({"input": reference.first} if reference else {})
     clock, reason = header_clock(chosen) if bag else (found.clock, found.clock_reason)
@@ -222,10 +225,10 @@ def _signals(
 
 
 def _names(joints: Mapping[str, str], output: Family) -> str:
-    """The robot's joints, with their names in the recording where these are others."""
+    """The robot's joints, with their names in the recording where these differ."""
     by_place = (
         output.pattern.endswith("[*]") and not output.told
-    )  # entries of an array are told by their places in the list
+    )  # entries of an array are identified by their index in the list
     if by_place or all(joint == name for joint, name in joints.items()):
         return f"[{', '.join(joints)}]"
     return f"{{{', '.join(f'{joint}: {json.dumps(name)}' for joint, name in joints.items())}}}"

@@ -1,4 +1,4 @@
-"""Which recorded number plays which role: what drives the machine, what it answers, and what else helps; each with its reason."""
+"""Assigns roles to recorded numbers: driving signal, output and further signals, each with its reason."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -33,13 +33,13 @@ from rhythmid.start.unnamed_joints import column_groups
 from rhythmid.start.unnamed_reference import with_reference
 from rhythmid.start.unsigned_effort import without_unsigned
 
-INTEGRAL = 0.9  # correlation from which a position and a velocity belong together
+INTEGRAL = 0.9  # correlation above which a position and a velocity belong together
 MEASURED: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
 
 
 @dataclass(frozen=True, eq=False)
 class Roles:
-    """Roles by name as in signals.yaml, what the input and the output are, whether the machine turns, and what a user should know."""
+    """Roles by name as in signals.yaml, the kinds of input and output, whether the machine is rotational, and notes."""
 
     choices: Mapping[str, Choice]
     input_kind: InputKind
@@ -52,12 +52,13 @@ class Roles:
 
 
 def first_answer(question: str, answers: Sequence[str]) -> int:
-    """Takes the best guess without asking."""
+    """Return the best guess without asking."""
     return 0
 
 
 def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_answer) -> Roles:
-    """Roles of what is in a source. Raises InputError where nothing can be the output, or no joint is called `joint`."""
+    """Roles of the numbers in a source. Raises InputError where no number can be the output, or no joint is called
+    `joint`."""
     known = [
         Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one) and not _is_clock(one)
     ]
@@ -141,7 +142,8 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
 
 
 def _is_clock(one: Recorded) -> bool:
-    """Whether it is a time: a field that is called one and goes forward, or a number that runs like a clock where no word says a motion."""
+    """Whether it is a time: a field that is named as one and increases, or a number that runs like a clock and has
+    no word for a motion."""
     meaning = meaning_of(one)
     if meaning.certain or meaning.quantity in MEASURED:
         return False
@@ -149,12 +151,12 @@ def _is_clock(one: Recorded) -> bool:
 
 
 def _of_other_side(one: Recorded, output: Recorded) -> bool:
-    """Whether it is of the left one where the output is of the right one, or the other way about."""
+    """Whether it is on the left where the output is on the right, or the reverse."""
     return one.side != output.side and "" not in (one.side, output.side)
 
 
 def _voltage(one: Known, output: Recorded, measured: Quantity) -> Known:
-    """A `v` that is not the velocity of the measured position, but has to do with it, is a voltage."""
+    """A `v` that is not the velocity of the measured position, but is related to it, is a voltage."""
     if measured != "position" or not is_lone_v(one.one) or one.quantity != "velocity":
         return one
     if derivative(output, one.one)[0] > INTEGRAL or not goes_along(one.one, output):
@@ -164,10 +166,10 @@ def _voltage(one: Known, output: Recorded, measured: Quantity) -> Known:
 
 
 def _without_copies(rest: list[Known], output: Recorded) -> tuple[list[Known], dict[int, float], list[str]]:
-    """What is left without copies of the output, the correlation of those that are kept, by id, and what to tell of the others.
+    """The numbers without copies of the output, the correlation of copies that are kept, by id, and notes on the others.
 
-    A copy is kept where its name says that it drives or is asked for, and nothing else that says so is there: a controller whose
-    reference stands still makes such an effort.
+    A copy is kept if its name says that it drives or is commanded, and no other number's name does: a controller
+    with a constant reference produces such an effort.
     """
     correlation = {id(one.one): copies_output(one.one, output) for one in rest}
     copies = [
@@ -188,7 +190,7 @@ def _doubted(choice: Choice, copies: Mapping[int, float]) -> Choice:
 
 
 def _idle(rest: list[Known], output: Recorded, ask: Ask) -> tuple[dict[str, Choice], list[str]]:
-    """What a user takes for the input where nothing is known to drive the machine; else what was left unused."""
+    """The input that the user chooses where no driving signal is known; else a note on what is not used."""
     own = [one for one in rest if _is_elsewhere_of(one, output)]
     along = [(coherent(one.one, output), one) for one in rest if one in own or goes_along(one.one, output)]
     along.sort(key=lambda pair: (pair[1] not in own, -pair[0]))
@@ -216,7 +218,7 @@ def _idle(rest: list[Known], output: Recorded, ask: Ask) -> tuple[dict[str, Choi
 
 
 def _is_elsewhere_of(one: Known, output: Recorded) -> bool:
-    """Whether it is of the output's joint by name, in another message."""
+    """Whether its name refers to the output's joint, in another message."""
     joint = meaning_of(output).joint
     return bool(output.topic and joint) and one.meaning.joint == joint and one.one.topic != output.topic
 
@@ -226,7 +228,7 @@ def _output_kind(quantity: Quantity) -> OutputKind:
 
 
 def _without_empty_letters(known: list[Known]) -> list[Known]:
-    """Single letters tell nothing where all of them would be one quantity, as V1 and V2."""
+    """Single letters have no meaning where all of them would be one quantity, as V1 and V2."""
     quantities = {one.quantity for one in known}
     told = any(one.meaning.certain or one.one.side or says_who_asks(one.one) for one in known)
     if len(known) > 1 and len(quantities) == 1 and not told:
@@ -235,7 +237,7 @@ def _without_empty_letters(known: list[Known]) -> list[Known]:
 
 
 def _output(known: list[Known], ask: Ask, place: str) -> tuple[Choice, list[Known]]:
-    """The measured motion: a position before a velocity before an acceleration, the one that moves most."""
+    """The measured motion: a position before a velocity before an acceleration, and the one that moves most."""
     for quantity in MEASURED:
         able = [
             one for one in known
@@ -259,8 +261,8 @@ def _output(known: list[Known], ask: Ask, place: str) -> tuple[Choice, list[Know
 
 
 def _worth_as_output(one: Known) -> float:
-    """How much it moves; what shows more than a few values counts before what does not, as do what is said to be measured, or is called by
-    a word."""
+    """Score by the size of the motion. Numbers with more than a few values, named as measured, or named by a word
+    come before the others."""
     moved = float(np.nanstd(one.one.value))
     moved *= 1e6 if shows_motion(one.one) else 1.0
     return moved * (1e3 if one.meaning.certain else 1.0) * (1e3 if one.meaning.commanded is False else 1.0)
@@ -293,7 +295,8 @@ def _degrees(ratio: float) -> str:
 
 
 def _rotary(choices: Mapping[str, Choice], output: Recorded, of_robot: bool, ask: Ask) -> tuple[bool, str]:
-    """Whether the machine turns, as units and names say; a joint of several, or a JointState's, that says nothing turns."""
+    """Whether the machine is rotational, by units and names; a joint of several, or of a JointState, is rotational
+    by default."""
     for choice in choices.values():
         rotary, why = rotary_of(choice.recorded)
         if rotary is not None:

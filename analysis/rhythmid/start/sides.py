@@ -1,5 +1,5 @@
-"""Columns of a left and a right one: `w_l` and `w_r`, `pwml` and `pwmr`, `left_speed` and `right_speed`, `Lspeed` and `RSpeed`, and of the
-corners of a vehicle. There an `r` is a side, and no reference."""
+"""Columns for left and right: `w_l` and `w_r`, `pwml` and `pwmr`, `left_speed` and `right_speed`, `Lspeed` and
+`RSpeed`, and the corners of a vehicle. There `r` means right, not reference."""
 
 import re
 from collections.abc import Iterator
@@ -21,19 +21,19 @@ SIDES = {
     "bl": "back_left",
     "br": "back_right",
 }
-# a word of its own, the last word of a name such as kneeLeft, the last letter of a name that is one word
+# a separate word, the last word of a name such as kneeLeft, the last letter of a one-word name
 WRITTEN = (
     re.compile(r"(?<![A-Za-z])(left|right|l|r)(?![A-Za-z])", re.IGNORECASE),
     re.compile(r"(?<=[a-z0-9])(Left|Right|L|R)(?![a-z])"),
     re.compile(r"^[a-z]{1,4}(l|r)$"),
 )
-# before a name that has a word whose meaning is known; the longer ones first
+# before a name with a known word; longer ones first
 BEFORE_NAME = re.compile(r"^(left|right|fl|fr|rl|rr|bl|br|l|r)([ _.-]*)(?=[a-z]{2})", re.IGNORECASE)
 
 
 def with_sides(found: Inventory) -> Inventory:
-    """The inventory with the side of every column whose name is another one's but for it, or that has a side before a known word where
-    another column has another one."""
+    """The inventory with the side of every column whose name differs from another one's only in the side, or that
+    has a side before a known word where another column has another side."""
     every = [one for one in (*found.recorded, *found.constant) if one.column]
     names = {one.said.lower() for one in every}
     begun = len({side for one in every for side, _ in _before_name(one.said)}) > 1
@@ -45,7 +45,7 @@ def with_sides(found: Inventory) -> Inventory:
 
 
 def _with_side(one: Recorded, names: set[str], begun: bool) -> Recorded:
-    """The column with its side, and without it in its name."""
+    """The column with its side, which is removed from its name."""
     for begin, end in _places(one.said):
         side = one.said[begin:end].lower()
         before, after = one.said[:begin], one.said[end:]
@@ -57,13 +57,14 @@ def _with_side(one: Recorded, names: set[str], begun: bool) -> Recorded:
 
 
 def _places(name: str) -> Iterator[tuple[int, int]]:
-    """Where a side may stand in a name."""
+    """Positions of a name at which a side may be."""
     for written in WRITTEN:
         yield from (match.span(1) for match in written.finditer(name))
 
 
 def _before_name(name: str) -> Iterator[tuple[str, str]]:
-    """The side before a name that holds a known word, and that name. A glued one stands before a capital or right before that word."""
+    """The side before a name with a known word. A side without a separator is before a capital or directly before
+    that word."""
     match = BEFORE_NAME.match(name)
     if match is None or is_word(words_of(name)[0]):
         return

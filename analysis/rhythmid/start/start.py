@@ -1,4 +1,4 @@
-"""From recordings of which nothing is said to the two files that describe them: signals.yaml and a nominal model.yaml."""
+"""Drafts the two files that describe recordings without metadata: signals.yaml and a nominal model.yaml."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """What a source holds, the roles that were guessed, the text of signals.yaml, and whether the machine moves in the source."""
+    """Content of a source, the guessed roles, the text of signals.yaml, and whether the machine moves in the source."""
 
     inventory: Inventory
     roles: Roles
@@ -64,7 +64,7 @@ class Guess:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """The guess, the nominal model, the text of model.yaml, and a line on each recording that is not used."""
+    """The guess, the nominal model, the text of model.yaml, and a line on each unused recording."""
 
     guess: Guess
     nominal: Nominal
@@ -99,7 +99,7 @@ class Start:
 def guess(
     source: str | Path, joint: str | None = None, rate: float | None = None, ask: Ask = first_answer
 ) -> Guess:
-    """Look at one recording and guess which channel is what; parameters and errors as of `start`."""
+    """Inspect one recording and guess the roles of its channels; parameters and errors as for `start`."""
     found = with_joints(with_sides(with_listed_joints(_inventory(source, rate))))
     roles = guess_roles(found, joint, ask)
     units = _units(roles)
@@ -127,7 +127,8 @@ def guess(
 def _guess_of_moving(
     sources: Sequence[str | Path], joint: str | None, rate: float | None, ask: Ask
 ) -> tuple[Guess, Sequence[str | Path]]:
-    """The guess of the first recording in which the machine moves, and those before it; of the first one, and none, where it moves in none."""
+    """The guess for the first recording in which the machine moves, and the recordings before it; for the first
+    one, and none, where it moves in none."""
     guesses = (guess(source, joint, rate, ask) for source in sources)
     first = None
     for number, found in enumerate(guesses):
@@ -139,7 +140,7 @@ def _guess_of_moving(
 
 
 def _inventory(source: str | Path, rate: float | None) -> Inventory:
-    """What is in a source; of a bag in which nothing was measured, where the vehicle is, too."""
+    """Inventory of a source; for a bag without measurements including the vehicle's pose."""
     found = inventory(source, rate)
     may_be_motion = (meaning for meaning in map(meaning_of, found.recorded) if meaning.quantity != "effort")
     if not found.is_bag or any(meaning.commanded is not True for meaning in may_be_motion):
@@ -156,16 +157,17 @@ def start(
     ask: Ask = first_answer,
     catalogue: Catalogue | None = None,
 ) -> Start:
-    """Look at recordings of one layout and guess what they are, and what the machine is.
+    """Inspect recordings of one layout and guess the roles of their channels and a nominal model.
 
     Parameters
     ----------
-    sources : bags or tables; roles are guessed from the first in which the machine moves, the nominal model from all in which it does.
-    joint : the joint to look at; by default the one that moves most.
+    sources : bags or tables; roles are guessed from the first in which the machine moves, the nominal model from
+        all in which it does.
+    joint : the joint to identify; by default the one that moves most.
     rate : of a table without a time [Hz].
-    ask : answers where several candidates are close; takes the best by default.
+    ask : called where several candidates are close; by default the best is taken.
 
-    Raises InputError, one line, where a source cannot be read, or nothing in it can be a motion.
+    Raises InputError, one line, where a source cannot be read, or contains no possible motion.
     """
     guessed, resting = _guess_of_moving(sources, joint, rate, ask)
     remarks = tuple(f"{one}: the machine stands still, so that it is not used here" for one in resting)

@@ -1,4 +1,4 @@
-"""A step that was made as a record began, of the effort or of what was asked for: it stands still for the whole record."""
+"""A step of the effort or the reference before the record began: the channel is constant over the whole record."""
 
 from collections.abc import Sequence
 
@@ -9,17 +9,16 @@ from rhythmid.start.joint import Joint
 from rhythmid.start.meaning import Quantity, force_unit_of, meaning_of
 
 BEFORE = "it never changes: taken for a step that was made as the record began; without it, delete this input"
-# of the way from where the output begins to a set point, that it keeps at most from the set point afterwards, rms: else it does not go there
+# largest rms distance from the set point afterwards, as a share of the initial distance, for an output that goes there
 LEFT = 0.5
-DUTY = "1"  # the unit of a share of a supply's voltage
-FIRST = 3  # samples by which it is told whether a machine starts from rest
-SLOW = (
-    0.2  # of the speed of the whole record, rms, that it then has at most: a machine that runs has all of it
-)
+DUTY = "1"  # unit of a share of a supply's voltage
+FIRST = 3  # samples that show whether a machine starts from rest
+# largest share of the record's rms speed that it has in these samples: a running machine has all of it
+SLOW = 0.2
 
 
 def step_before(constant: Sequence[Recorded], joint: Joint) -> Recorded | None:
-    """The one effort, by its name or unit, among what stands still at another value than zero; None where there is none or several."""
+    """The one effort, by its name or unit, among the nonzero constants; None where there is none or several."""
     efforts = [
         one for one in constant
         if (meaning := meaning_of(one)).quantity == "effort" and meaning.certain and joint.includes(one, meaning) and _is_known(one)
@@ -30,8 +29,8 @@ def step_before(constant: Sequence[Recorded], joint: Joint) -> Recorded | None:
 def set_point_before(
     constant: Sequence[Recorded], joint: Joint, output: Recorded, measured: Quantity
 ) -> Recorded | None:
-    """The one set point of the output, among what stands still, to which the output goes from elsewhere; None where there is none or
-    several."""
+    """The one set point of the output, among the constants, to which the output moves from another value; None
+    where there is none or several."""
     asked = [
         one for one in constant
         if (meaning := meaning_of(one)).quantity == measured and meaning.commanded and meaning.certain
@@ -43,10 +42,10 @@ def set_point_before(
 def duty_before(
     constant: Sequence[Recorded], joint: Joint, output: Recorded, measured: Quantity
 ) -> Recorded | None:
-    """The one duty of a motor's bridge, among what stands still, that is on while the output starts from rest; None where there is none or
-    several.
+    """The one duty cycle of a motor's bridge, among the constants, that is on while the output starts from rest;
+    None where there is none or several.
 
-    A voltage that stands still may be that of a supply, which drives nothing.
+    A constant voltage may be that of a supply, which is no driving signal.
     """
     fed = [
         one for one in constant
@@ -56,7 +55,7 @@ def duty_before(
 
 
 def _starts(output: Recorded, measured: Quantity) -> bool:
-    """Whether an output is slow in its first samples beside what it becomes."""
+    """Whether an output is slow in its first samples compared with later."""
     kept = np.isfinite(output.value)
     time, value = output.time[kept], output.value[kept]
     speed = np.abs(value if measured == "velocity" else np.gradient(value, time))
@@ -65,12 +64,12 @@ def _starts(output: Recorded, measured: Quantity) -> bool:
 
 
 def _goes_to(output: Recorded, wanted: float) -> bool:
-    """Whether an output begins far from this value and is near it afterwards, in the second half of its samples."""
+    """Whether an output starts far from this value and is near it in the second half of its samples."""
     value = output.value[np.isfinite(output.value)]
     after = value[len(value) // 2 :] - wanted
     return bool(float(np.sqrt(np.mean(after**2))) < LEFT * abs(float(value[0]) - wanted))
 
 
 def _is_known(one: Recorded) -> bool:
-    """Whether it has a value, which is not zero."""
+    """Whether it has a nonzero value."""
     return bool(np.isfinite(one.value).all() and one.value[:1].any())

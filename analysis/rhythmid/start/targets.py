@@ -1,4 +1,4 @@
-"""References that are called as what they are of, with a `t` for target before it: `tq_0` beside `q_0`, `tpos` beside `pos`."""
+"""References named as their motion with a `t` for target before it: `tq_0` beside `q_0`, `tpos` beside `pos`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,7 +10,8 @@ AIMED_AT = frozenset({"position", "velocity"})
 
 
 def with_targets(known: Sequence[Known], among: Sequence[Known]) -> list[Known]:
-    """What is known, where columns whose names are a `t` and the name of a motion `among` all columns mean what was asked of that one."""
+    """The known numbers; columns whose names are `t` plus the name of a motion `among` all columns become commands
+    of that motion."""
     motions = {
         one.one.said.lower(): one
         for one in among
@@ -20,7 +21,7 @@ def with_targets(known: Sequence[Known], among: Sequence[Known]) -> list[Known]:
 
 
 def _name_after_target(one: Known) -> str:
-    """A column's name without a first `t`, where no word or unit says what it is; empty else."""
+    """A column's name without an initial `t`, where no word or unit states its quantity; else empty."""
     name = one.one.said.lower()
     untold = bool(one.one.column) and not one.meaning.certain
     return name.removeprefix(TARGET) if untold and name.startswith(TARGET) else ""

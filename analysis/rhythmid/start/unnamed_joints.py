@@ -1,5 +1,5 @@
-"""Columns without names of several joints: groups of as many columns as there are joints, all positions, then all velocities, then what
-else was recorded of each."""
+"""Unnamed columns of several joints: groups of one column per joint, first all positions, then all velocities, then
+the other quantities."""
 
 from collections import defaultdict
 from dataclasses import dataclass, replace
@@ -9,13 +9,14 @@ from rhythmid.start.known import Known
 from rhythmid.start.meaning import Quantity
 from rhythmid.start.relation import integrals
 
-FEWEST_JOINTS = 2  # joints whose velocities stand in the same distance behind their positions, from which columns are groups
+# least number of joints whose velocities follow their positions at the same distance, for columns to form groups
+FEWEST_JOINTS = 2
 
 
 @dataclass(frozen=True)
 class ColumnGroups:
-    """Groups of `count` columns, of which the first begins at column `first`; `position` and `velocity` are numbers of groups, counted
-    from 0."""
+    """Groups of `count` columns; the first group begins at column `first`. `position` and `velocity` are indices of
+    groups, counted from 0."""
 
     first: int
     count: int
@@ -23,7 +24,7 @@ class ColumnGroups:
     velocity: int
 
     def told(self, one: Known) -> Known:
-        """The number of a column with its joint, counted from 1, and its quantity where it stands among positions or velocities."""
+        """The number of a column with its joint, counted from 1, and its quantity if it is a position or velocity."""
         group, joint = divmod(int(one.one.column) - self.first, self.count)
         quantities: dict[int, Quantity] = {self.position: "position", self.velocity: "velocity"}
         meaning = replace(one.meaning, joint=str(joint + 1), quantity=quantities.get(group))
@@ -36,7 +37,8 @@ class ColumnGroups:
 
 
 def column_groups(found: Inventory) -> ColumnGroups | None:
-    """The groups of a table whose columns have numbers for names; None where there are no two joints' positions and velocities."""
+    """The groups of a table with numbers as column names; None where there are not two joints with positions and
+    velocities."""
     every = (*found.recorded, *found.constant)
     if not every or not all(one.column.isdigit() for one in every):
         return None

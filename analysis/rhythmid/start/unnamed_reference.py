@@ -1,4 +1,5 @@
-"""What was asked for of a measured motion where nothing else drives, and no name says it: another motion that it follows."""
+"""Reference of a measured motion where there is no other driving signal and no name states it: another motion that
+it follows."""
 
 from dataclasses import replace
 
@@ -7,15 +8,15 @@ from rhythmid.start.direction import may_be_one_motion
 from rhythmid.start.known import Known
 from rhythmid.start.relation import coherent, follows, predicts
 
-FOLLOWS = (
-    0.9  # coherence from which a linear servo makes the one of the other, however much later and smaller
-)
+FOLLOWS = 0.9  # coherence above which a linear servo generates one from the other, with any lag and gain
 
 
 def with_reference(own: Known, rest: list[Known]) -> tuple[list[Known], list[str]]:
-    """What is known beside the output, with the motion that leads it as what was asked for, and a note on it; as it is where none does.
+    """The known numbers beside the output, with the motion that leads it as the command, and a note on it;
+    unchanged where there is none.
 
-    The output is called measured, and the other one is not. Then it need not be a copy: its servo may be slow, or it seldom sampled.
+    The output is named as measured, and the other number is not. Then it need not be a copy: the servo may be slow,
+    or the output sampled at a low rate.
     """
     if own.meaning.commanded is not False:
         return rest, []
@@ -34,6 +35,6 @@ def with_reference(own: Known, rest: list[Known]) -> tuple[list[Known], list[str
 
 
 def _leads(first: Recorded, second: Recorded) -> bool:
-    """Whether the second comes later, is of the first one's size, and is told by its past better than the other way about."""
+    """Whether the second is later, has the size of the first, and is predicted by its past better than the reverse."""
     told = follows(first, second)
     return told.lag > 0.0 and told.is_copy and predicts(first, second) > predicts(second, first)

@@ -1,4 +1,5 @@
-"""Measured efforts of which only the size was recorded: they say how hard, and not which way, and are no effort of a model."""
+"""Measured efforts recorded without their sign: they give the magnitude but not the direction, and are no effort of
+a model."""
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from rhythmid.start.relation import together
 def without_unsigned(
     rest: list[Known], output: Recorded, measured: str | None
 ) -> tuple[list[Known], list[str]]:
-    """What is left without them, and what to tell of each; only beside a measured position."""
+    """The numbers without unsigned efforts, and a note on each; only beside a measured position."""
     if measured != "position":
         return rest, []
     found = [

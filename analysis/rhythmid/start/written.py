@@ -1,4 +1,4 @@
-"""signals.yaml and model.yaml as text, every guess with its reason and its alternatives in comments."""
+"""signals.yaml and model.yaml as text, with the reason and the alternatives of every guess as comments."""
 
 import json
 import re
@@ -23,9 +23,9 @@ from rhythmid.start.roles import Roles
 from rhythmid.units import Units
 from rhythmid.value import Value
 
-GUESSED = "guessed signals.yaml"  # what messages call the file that is not written yet
+GUESSED = "guessed signals.yaml"  # name in messages of the file that is not written yet
 WIDTH = 110
-LISTED = 8  # alternatives that a comment names
+LISTED = 8  # largest number of alternatives in a comment
 MEANS = {
     "input": "what drives the machine", "output": "the measured motion", "velocity": "its velocity, as recorded beside it",
     "effort": "the measured effort of the actuator", "reference": "what the controller is asked for",
@@ -35,7 +35,7 @@ MEANS = {
 
 @contextmanager
 def as_guessed() -> Iterator[None]:
-    """Errors in what was guessed say so, and name no line of a file that is not there."""
+    """Context in which errors refer to the guesses, not to a line of a file that does not exist yet."""
     try:
         yield
     except InputError as error:
@@ -46,7 +46,7 @@ def as_guessed() -> Iterator[None]:
 def signals_yaml(
     found: Inventory, roles: Roles, units: Units, clock: Clock, clock_reason: str, use: str | None = None
 ) -> str:
-    """The text of signals.yaml; `use` is its line for the part of the record that is worth using, where that is known."""
+    """The text of signals.yaml; `use` is its line for the useful part of the record, where known."""
     lines = [
         *comment(f"Which channel of {found.path.name} is what. Guessed by `rhythmid init`: look through it and correct what is wrong."),
         "",
@@ -98,7 +98,7 @@ def signals_yaml(
 
 
 def _time_doubt(clock: Clock) -> list[str]:
-    """A comment on a unit of times that no heading tells, and that is not the second."""
+    """A comment on a unit of times that no heading states and that is not the second."""
     if clock.kind != "column" or clock.scale == 1.0 or heading_of(str(clock.column)).unit:
         return []
     return comment(
@@ -107,7 +107,7 @@ def _time_doubt(clock: Clock) -> list[str]:
 
 
 def clock_of(found: Inventory, roles: Roles) -> tuple[Clock, str]:
-    """How times are told: of a bag by stamps, where all chosen topics bear them."""
+    """Source of the times; for a bag stamps, where all chosen topics have them."""
     if not found.is_bag:
         return found.clock, found.clock_reason
     return header_clock({role: choice.recorded for role, choice in roles.choices.items()})
@@ -144,7 +144,7 @@ def model_yaml(nominal: Nominal, roles: Roles, units: Units, explicit: bool) -> 
 
 
 def _why(label: str, nominal: Nominal) -> list[str]:
-    """The reason for a part of the model, and what is doubtful about it."""
+    """The reason for a part of the model, and doubts about it."""
     lines = comment(f"{nominal.reasons[label]}.")
     return lines + (comment(f"  CHECK: {nominal.doubts[label]}.") if label in nominal.doubts else [])
 
@@ -160,7 +160,7 @@ def _value(value: Value) -> str:
 
 
 def time_of(clock: Clock) -> str:
-    """How signals.yaml says how times are told."""
+    """The clock in the notation of signals.yaml."""
     if clock.kind == "rate":
         return f"{{sample_rate: {clock.rate!r}}}"
     if clock.kind == "column":
@@ -191,13 +191,13 @@ def _channel(role: str, one: Recorded, roles: Roles, units: Units, bag: bool) ->
 
 
 def _held_note(one: Recorded, roles: Roles) -> str | None:
-    """What to tell of the input where its samples show that each is held until the next one."""
+    """Note on an input whose samples show a hold."""
     there = [(each, np.isfinite(each.value)) for each in (one, roles.choices["output"].recorded)]
     return held_note(*(Channel(each.time[kept], each.value[kept], each.unit) for each, kept in there))
 
 
 def _held_comment(one: Recorded, roles: Roles) -> list[str]:
-    """A comment where the samples of what drives show that it is held, and no name says so."""
+    """A comment where the samples of the driving signal show a hold that no name states."""
     note = None if meaning_of(one).commanded or roles.input_kind == "reference" else _held_note(one, roles)
     return comment(f"  CHECK: {note}.") if note else []
 
@@ -217,7 +217,7 @@ def _unit(role: str, one: Recorded, roles: Roles, units: Units) -> str:
 
 
 def _unit_doubt(one: Recorded, unit: str) -> list[str]:
-    """A comment on a unit that neither a heading nor the type of a message tells."""
+    """A comment on a unit that neither a heading nor a message type states."""
     if one.unit and one.unit != unit:
         return comment(
             f"  CHECK: its heading says {one.written_unit}, and {unit} is needed: scale: how many {unit} one {one.unit} is."
@@ -234,7 +234,7 @@ def _scale(scale: float) -> str:
 
 
 def _said(role: str, choice: Choice) -> list[str]:
-    """The reason of a choice, what is doubtful, and what else could play the role."""
+    """The reason for a choice, doubts, and alternatives for the role."""
     one = choice.recorded
     lines = comment(f"{role}, {MEANS[role]}: {choice.reason}.")
     if one.scale != 1.0:

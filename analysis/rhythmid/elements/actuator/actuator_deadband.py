@@ -1,4 +1,4 @@
-"""Actuator dead band: nothing below the threshold d, f -/+ d beyond it (stiction of a valve, gate-drive dead time)."""
+"""Actuator dead band: zero force below the threshold d, f -/+ d beyond it (stiction of a valve, gate-drive dead time)."""
 
 from math import inf
 

@@ -3,8 +3,8 @@
 Examples: the bus and the current loop of a drive, or a valve and its hose. Unlike the input delay it also delays the robot's own
 forcing and a controller's force. It is inside the control loop, and reduces its damping.
 
-Without a controller, all inputs of the machine are later by tau_a, and so is the motion: it is then observationally equivalent to a
-measurement delay, and only their sum is identifiable.
+Without a controller, tau_a delays all inputs of the machine, and so the motion. It is then observationally
+equivalent to a measurement delay, and only their sum is identifiable.
 """
 
 from rhythmid.elements.dead_time import dead_time

@@ -1,4 +1,4 @@
-"""Actuator fade: the force weakens with time, (1 - beta t) f, by a draining battery or a heating motor.
+"""Actuator fade: the force decreases with time, (1 - beta t) f, because of a draining battery or a heating motor.
 
 t is the record's time; the fading begins at its start.
 """

@@ -1,7 +1,7 @@
 """Actuator gain: the force is g times the commanded one.
 
-With a free mass the gain only scales mass, damping and stiffness, so it is calibration and not missing physics;
-weigh the mass to know it.
+With a free mass the gain only scales mass, damping and stiffness, so it is calibration and no missing effect. It is
+identifiable if the mass is known by weighing.
 """
 
 from math import inf
@@ -22,7 +22,7 @@ ELEMENT = Element(
     kernel=kernel,
     size="gain",
     absent=1.0,
-    candidate=False,  # the same as another mass, damping and stiffness
+    candidate=False,  # equivalent to another mass, damping and stiffness
     starts=lambda s: [{"gain": 1.02}],
     also_known_as=("force constant", "motor constant error"),
     family="calibration",

@@ -1,8 +1,8 @@
 """Actuator lag: first order, tau_a df/dt = f_cmd - f, on the whole actuator force f0 + u.
 
-A lag shorter than one integration step h is computed with the time constant h and a direct share 1 - tau_a / h, whose
-transfer function agrees to first order in frequency: the effect vanishes exactly at tau_a = 0, grows smoothly from
-there, and stays stable. It starts at the force that is asked for.
+A lag shorter than one integration step h is computed with the time constant h and a direct share 1 - tau_a / h,
+whose transfer function agrees to first order in frequency. So the effect vanishes exactly at tau_a = 0, grows
+smoothly from there, and is stable. It starts at the commanded force.
 """
 
 from math import inf

@@ -1,6 +1,6 @@
 """Actuator nonlinearity: cubic compression f - gamma f^3 (magnetic saturation), or expansion for gamma < 0.
 
-Meant for weak compression: beyond |f| = 1 / sqrt(3 gamma) the law falls again, and no actuator does that.
+It is meant for weak compression: beyond |f| = 1 / sqrt(3 gamma) the law decreases again, which no actuator does.
 """
 
 from rhythmid.elements.element import Element, Parameter

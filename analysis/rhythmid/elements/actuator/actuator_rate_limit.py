@@ -1,8 +1,8 @@
 """Actuator rate limit: the force changes by at most R per second (slew rate of an amplifier, speed of a valve).
 
-The output moves from its memory towards the force, at most by R times the time that has elapsed. That is exact where
-the input is held or stays on one side of the limit during an integration step, and of second order in the step else. The
-actuator starts at the force that is asked for.
+The output moves from its memory state towards the force, at most by R times the elapsed time. That is exact where
+the input is held or stays on one side of the limit during an integration step, and of second order in the step
+otherwise. The actuator starts at the commanded force.
 """
 
 import math
@@ -13,7 +13,7 @@ from rhythmid.elements.element import ELAPSED, Element, Parameter
 
 def kernel(f, t, rate, elapsed, memory):
     output = f
-    if abs(f - memory) > rate * elapsed:  # never at an infinite rate
+    if abs(f - memory) > rate * elapsed:  # never for an infinite rate
         output = memory + math.copysign(rate * elapsed, f - memory)
     return output, output
 

@@ -1,4 +1,4 @@
-"""Actuator saturation: the force is limited to [-L, L]. Nothing is seen of it while the force stays within."""
+"""Actuator saturation: the force is limited to [-L, L]. It is not identifiable while the force stays within the limit."""
 
 from math import inf
 
@@ -18,7 +18,7 @@ ELEMENT = Element(
     kernel=kernel,
     size="limit",
     absent=inf,
-    starts=lambda s: [  # the last two cut off no more than the highest peaks
+    starts=lambda s: [  # the last two limit only the highest peaks
         {"limit": limit}
         for limit in (
             *(w * s.effort for w in (1.0, 1.4, 2.0, 3.0)),

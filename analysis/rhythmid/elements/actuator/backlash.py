@@ -1,7 +1,8 @@
 """Backlash: the play operator of width b on the actuator force; the output follows only after the gap is crossed.
 
-The play is the projection of its memory w onto [f - b/2, f + b/2]. That is exact while the force does not turn within an
-integration step h, and errs by at most h^2 d2f/dt2 / 8 where it does. It starts in the middle, at the force asked for.
+The play is the projection of its memory state w onto [f - b/2, f + b/2]. That is exact while the force does not
+reverse within an integration step h; otherwise the error is at most h^2 d2f/dt2 / 8. It starts in the middle of the
+gap, at the commanded force.
 """
 
 from math import inf

@@ -1,14 +1,14 @@
-"""DC motor fed with a voltage: f = (k_t / R) (V_s d - k_t v), its current (V_s d - k_t v) / R times its torque constant.
+"""DC motor driven by a voltage: f = (k_t / R) (V_s d - k_t v), its current (V_s d - k_t v) / R times its torque constant.
 
-d is the signal that reaches it, in volts with `supply` = 1, or a duty cycle in [-1, 1] with `supply` the voltage V_s of
-the bus. In SI the torque constant [N*m/A] is the back-EMF constant [V*s/rad], too. Constants are those at the output: of
-a motor behind a gear of ratio n, k_t is n times the motor's own. The inductance is left out: its time constant L / R, a
-millisecond and less, is an `actuator_lag` before the motor where it shows. Friction, the rotor's inertia and a limit of
-the voltage (an `actuator_saturation` that stands before the motor) are elements of their own.
+d is the input signal of the motor, in volts with `supply` = 1, or a duty cycle in [-1, 1] with `supply` the bus
+voltage V_s. In SI units the torque constant [N*m/A] is also the back-EMF constant [V*s/rad]. The constants refer to
+the output: for a motor with a gear of ratio n, k_t is n times the motor's own. The inductance is left out. Its time
+constant L / R, a millisecond or less, is an `actuator_lag` before the motor where it matters. Friction, the rotor's
+inertia and a voltage limit (an `actuator_saturation` before the motor) are separate elements.
 
-A position servo that regulates its voltage is a `position_control` in the command path and this motor: what the
-controller puts out, and every element before the motor, is then in volts, so that a gain k_p [N*m/rad] is read as [V/rad].
-A nominal element: what it adds to a machine that is driven by a force is a gain and a viscous damping k_t^2 / R.
+A position servo that controls its voltage is a `position_control` in the command path and this motor. The
+controller's output, and every element before the motor, is then in volts, so a gain k_p [N*m/rad] has the unit
+[V/rad]. A nominal element: in a machine driven by a force it adds only a gain and a viscous damping k_t^2 / R.
 """
 
 from math import inf

@@ -1,9 +1,9 @@
-"""Torque-speed limit: the faster the motor turns, the less force its supply leaves, up to a speed at which none is left.
+"""Torque-speed limit: the force available from the supply decreases with the motor's speed, to zero at the no-load speed.
 
-A current controller has no more than the supply voltage V, of which k_t v stands against the motor's own motion: the force
-is at most k_t (V - k_t v) / R = s (v0 - v), with the no-load speed v0 = V / k_t and the slope s = k_t^2 / R. Below the line the force
-is what was asked for. Drives of legged robots reach it in swing and in jumps; at low speeds nothing is seen of it, and a limit of the current is
-an `actuator_saturation` beside it.
+A current controller has at most the supply voltage V, of which the back-EMF takes k_t v. So the force is at most
+k_t (V - k_t v) / R = s (v0 - v), with the no-load speed v0 = V / k_t and the slope s = k_t^2 / R. Below that line
+the force is the commanded one. Drives of legged robots reach the limit in swing and in jumps; at low speeds it is
+not identifiable. An additional current limit is an `actuator_saturation`.
 """
 
 from math import inf

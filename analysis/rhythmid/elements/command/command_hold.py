@@ -1,8 +1,8 @@
 """Command hold: the drive takes a new command only every P seconds and holds it (zero-order hold at its own rate).
 
-A command waits for the next tick t = k P; of those that wait together the last one counts. On average this is a delay
-of P/2 with the roll-off of the hold. It is meant for commands that are themselves held from stamp to stamp. Ticks are
-counted from the record's start; another phase of the ticks acts like another delay of up to P.
+A command waits for the next tick t = k P; of several waiting commands the last one is used. On average this is a
+delay of P/2 with the roll-off of the hold. It is meant for commands that are themselves held between stamps. Ticks
+are counted from the record's start; another phase of the ticks is equivalent to an additional delay of up to P.
 """
 
 import math
@@ -15,7 +15,7 @@ from rhythmid.elements.element import Element, Parameter
 def delay_of(stamps, period):
     if period <= 0.0:
         return np.zeros(len(stamps))
-    ticks = np.ceil(stamps / period - 1e-6)  # a command on the tick is in time
+    ticks = np.ceil(stamps / period - 1e-6)  # a command at the tick is in time
     return np.maximum(ticks * period - stamps, 0.0)
 
 
@@ -28,7 +28,8 @@ ELEMENT = Element(
     delay=delay_of,
     size="period",
     clock="period",
-    starts=lambda s: [  # usual rates of drives and buses, from twice the sample period to a quarter of the motion's
+    # usual rates of drives and buses, from twice the sample period to a quarter of the motion's period
+    starts=lambda s: [
         {"period": 1.0 / rate}
         for rate in (
             500.0,

@@ -1,9 +1,9 @@
 """Command jitter: every command is late by its own random delay, uniform on [0, sqrt(12) sigma], in order.
 
-The draw is a function of the stamp and the seed alone, so that a run can be repeated. The mean, sqrt(3) sigma, acts as
-input delay. On average the jitter multiplies H_m by its characteristic function at w - m w_p, about
-1 - sigma^2 (w - m w_p)^2 / 2. A simulation with another seed does not repeat the real draw: sigma is estimated from
-that roll-off and from output noise that grows with the command's slope, not by output error.
+The draw is a function of the stamp and the seed alone, so a run is reproducible. The mean, sqrt(3) sigma, acts as
+input delay. On average the jitter multiplies H_m by its characteristic function at w - m w_p, which is about
+1 - sigma^2 (w - m w_p)^2 / 2. A simulation with another seed does not reproduce the real draw. So sigma is not
+estimated by output error, but from that roll-off and from output noise that grows with the command's slope.
 """
 
 import math

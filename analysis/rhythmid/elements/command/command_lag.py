@@ -1,8 +1,8 @@
 """Command lag: first order, tau du_bar/dt = u - u_bar, on the command u alone; the robot's own forcing is not lagged.
 
 A lag shorter than one integration step h is computed with the time constant h and a direct share 1 - tau / h, whose
-transfer function agrees to first order in frequency: the effect vanishes exactly at tau = 0, grows smoothly from
-there, and stays stable. It starts at the command.
+transfer function agrees to first order in frequency. So the effect vanishes exactly at tau = 0, grows smoothly from
+there, and is stable. It starts at the command.
 """
 
 from math import inf

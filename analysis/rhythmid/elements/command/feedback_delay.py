@@ -1,7 +1,8 @@
-"""Feedback delay: a controller works on the position and the speed of tau_f ago, x(t - tau_f) and v(t - tau_f).
+"""Feedback delay: a controller uses the position and the speed at an earlier time, x(t - tau_f) and v(t - tau_f).
 
-The time that a controller's own measurement and its computation take, inside the loop. Its reference is not delayed by it:
-what the computation adds there is part of the input delay. It turns the phase of the loop, and takes k_p tau_f from its damping.
+It is the time that a controller's own measurement and its computation take, inside the loop. It does not delay the
+reference: the computation time of the reference is part of the input delay. The delay shifts the phase of the loop
+and reduces its damping by k_p tau_f.
 """
 
 from rhythmid.elements.dead_time import dead_time

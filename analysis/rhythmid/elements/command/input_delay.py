@@ -1,6 +1,6 @@
 """Input delay: the command u acts tau_u seconds after its stamp, u_bar(t) = u(t - tau_u).
 
-The forcing f0, generated on the robot, is not delayed; that is what makes the two delays separable.
+The forcing f0, generated on the robot, is not delayed; this makes the two delays separately identifiable.
 """
 
 import math

@@ -1,6 +1,6 @@
-"""Input delay drift: the command's delay grows with time, tau_u + r t (a queue that fills, a clock that runs away).
+"""Input delay drift: the command's delay grows with time, tau_u + r t (a queue that fills, a clock that drifts).
 
-It acts on the command alone: the limit cycle, which the robot makes itself, keeps its phase. t is the command's stamp.
+It acts on the command alone: the limit cycle, which is generated on the robot, keeps its phase. t is the command's stamp.
 """
 
 from rhythmid.elements.element import Element, Parameter

@@ -1,8 +1,8 @@
 """Position control: the force of a controller that drives the mass to its reference r, F = k_p (r - x) - k_d v.
 
-It closes the loop around the machine: the command u that reaches it, delayed and filtered as the other command elements
-say, is the reference of a position, and its force is what forcing and actuator elements act on. A nominal element: its
-gains are known from the drive's settings, or free where they are not.
+It closes the loop around the machine. Its input, the command u after the other command elements, is the position
+reference. Its output is the force on which forcing and actuator elements act. A nominal element: its gains are
+known from the drive's settings, or free where they are not.
 """
 
 from math import inf

@@ -1,8 +1,8 @@
 """Reference rate limit: a controller's reference follows the command, but changes by at most R per second.
 
-What hobby servos and drives with a set-point ramp do; it limits the speed, not the force. The output moves from its memory
-towards the command, at most by R times the time that has elapsed: exact for a held command. It starts where the machine
-is.
+Hobby servos and drives with a set-point ramp do this; it limits the speed, not the force. The output moves from its
+memory state towards the command, at most by R times the elapsed time, which is exact for a held command. It starts
+at the machine's position.
 """
 
 import math
@@ -13,7 +13,7 @@ from rhythmid.elements.element import ELAPSED, Element, Parameter
 
 def kernel(f, t, rate, elapsed, memory):
     output = f
-    if abs(f - memory) > rate * elapsed:  # never at an infinite rate
+    if abs(f - memory) > rate * elapsed:  # never for an infinite rate
         output = memory + math.copysign(rate * elapsed, f - memory)
     return output, output
 

@@ -1,7 +1,7 @@
 """Velocity control: the force of a controller that drives the mass at its reference speed r, F = k_v (r - v).
 
-It closes the loop around the machine: the command u that reaches it, delayed and filtered as the other command elements
-say, is the reference of a speed, and its force is what forcing and actuator elements act on. A nominal element.
+It closes the loop around the machine. Its input, the command u after the other command elements, is the speed
+reference. Its output is the force on which forcing and actuator elements act. A nominal element.
 """
 
 from math import inf

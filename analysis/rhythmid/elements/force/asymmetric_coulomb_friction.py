@@ -1,8 +1,8 @@
 """Coulomb friction whose level depends on the direction: F = -F_c (1 + a sgn v) sgn v, regularised by tanh.
 
-The asymmetric part -F_c a sgn(v)^2 is a constant while the machine slides. Where a rest length or a constant force is
-free, it differs from symmetric friction near v = 0 only; with those known (a weighed mass, a measured rest length)
-its level shows.
+The asymmetric part -F_c a sgn(v)^2 is a constant while the machine slides. Where a rest length or a constant force
+is free, it differs from symmetric friction only near v = 0. With those known (a weighed mass, a measured rest
+length), its level is identifiable.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Bilinear stiffness: another stiffness beyond the kink, F = -dk (x - x_b) for x > x_b.
 
-The other side needs no element of its own: with a free linear spring, -dk on this side is +dk on the other.
+The other side needs no separate element: with a free linear spring, -dk on this side is +dk on the other.
 """
 
 from rhythmid.elements.element import Element, Parameter

@@ -1,10 +1,11 @@
 """Bouc-Wen hysteresis with exponent 1: F = -k_h z, dz/dt = v [1 - |z| / z_y (s sgn(v z) + 1 - s)].
 
-The smooth one of the family: the loop bends from its reversal on and creeps to the sliding force k_h z_y, which
-`elastoplastic_hysteresis` (exponent 2) reaches with a knee; the loop does not depend on speed. The shape s is 1/2 for
-unloading along the elastic line (Wen's beta = gamma) and 1 for Dahl's friction; below 1/2 the loop would make energy. The
-state is the share z / z_y; where the mass travels more than z_y in one integration step, it changes over that travel
-instead, at the same sliding force. Coulomb friction is its limit for z_y -> 0 with k_h z_y kept.
+The smooth one of the family: from a reversal on, the curve bends gradually towards the sliding force k_h z_y, which
+`elastoplastic_hysteresis` (exponent 2) reaches with a knee. The loop does not depend on speed. The shape s is 1/2
+for unloading along the elastic line (Wen's beta = gamma) and 1 for Dahl's friction; below 1/2 the loop would
+generate energy. The state is the share z / z_y. Where the mass travels more than z_y in one integration step, the
+state changes over that travel instead, with the same sliding force. Coulomb friction is its limit for z_y -> 0 with
+k_h z_y kept.
 """
 
 from math import inf
@@ -36,8 +37,8 @@ ELEMENT = Element(
         {"stiffness": 0.02 * s.stiffness / w, "yield_displacement": w * s.position, "shape": 0.5}
         for w in (0.1, 0.4, 1.2)
     ],
-    # from sliding one way to sliding the other it takes two yield displacements: in cycles of a shorter travel it nears a spring (beyond that
-    # it does 7 % of its mean square at the end of this range, 1.5 % at twice that)
+    # reversal of sliding takes two yield displacements: in cycles of a shorter travel it approaches a spring (the
+    # difference from a spring is 7 % of its mean square at the end of this range, 1.5 % at twice that)
     ranges=lambda s: {"yield_displacement": (0.0, 0.5 * (s.high - s.low))},
     against="base",
     also_known_as=("smooth hysteresis", "Dahl friction", "presliding friction"),

@@ -1,6 +1,6 @@
-"""Constant force: F = F_0 (bias of the actuator, weight of a tilted axis).
+"""Constant force: F = F_0 (bias of the actuator, weight on a tilted axis).
 
-A candidate where nothing that is estimated absorbs it, such as the rest length of a spring or the weight.
+A candidate only where no estimated parameter absorbs it, such as the rest length of a spring or the weight.
 """
 
 from rhythmid.elements.element import Element, Parameter
@@ -20,7 +20,7 @@ ELEMENT = Element(
     acts="body",
     size="force",
     starts=lambda s: [{"force": 0.02 * s.force}],
-    # a rest length, a hanging position or a weight that is estimated takes it up
+    # an estimated rest length, hanging position or weight absorbs it
     needless_with=(
         "linear_spring.rest_length",
         "pendulum_gravity.reference",

@@ -1,8 +1,8 @@
 """Coulomb (dry) friction: F = -F_c sgn(v), regularised as -F_c tanh(v / v_t).
 
-The transition speed v_t is estimated with the rest: held fixed at a wrong value it lets a richer friction law win.
-A transition too sharp for the integration step h is widened to F_c h / (2 m), so that a sticking mass comes to rest
-instead of chattering.
+The transition speed v_t is estimated together with F_c: fixed at a wrong value it would favour a more complex
+friction law. A transition too sharp for the integration step h is widened to F_c h / (2 m), so that a sticking mass
+comes to rest without chattering.
 """
 
 import math

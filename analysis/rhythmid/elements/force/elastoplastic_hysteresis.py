@@ -1,9 +1,9 @@
 """Elastoplastic hysteresis: a spring that yields, F = -k_h z, with dz/dt = v (1 - (z / z_y)^2) while loading, else v.
 
 The smooth Jenkins element (Bouc-Wen with exponent 2 and no degradation): stiff at reversals, sliding at the force
-k_h z_y; the loop does not depend on speed. Coulomb friction is its limit for z_y -> 0 with k_h z_y kept. The state is
-the share z / z_y; where the mass travels more than z_y in one integration step, it changes over that travel instead,
-at the same sliding force.
+k_h z_y. The loop does not depend on speed. Coulomb friction is its limit for z_y -> 0 with k_h z_y kept. The state
+is the share z / z_y. Where the mass travels more than z_y in one integration step, the state changes over that
+travel instead, with the same sliding force.
 """
 
 from math import inf
@@ -34,8 +34,8 @@ ELEMENT = Element(
     starts=lambda s: [
         {"stiffness": 0.02 * s.stiffness / w, "yield_displacement": w * s.position} for w in (0.1, 0.4, 1.2)
     ],
-    # from sliding one way to sliding the other it takes two yield displacements: in cycles of a shorter travel it is a spring (beyond that
-    # it does 3 % of its mean square at the end of this range, 0.2 % at twice that)
+    # reversal of sliding takes two yield displacements: in cycles of a shorter travel it is a spring (the
+    # difference from a spring is 3 % of its mean square at the end of this range, 0.2 % at twice that)
     ranges=lambda s: {"yield_displacement": (0.0, 0.5 * (s.high - s.low))},
     against="base",
     also_known_as=(

@@ -1,7 +1,7 @@
 """End stop: beyond x_s the mass meets a spring and a damper (Kelvin-Voigt contact) that push but never pull.
 
-N = max(0, k_s p + c_s dp/dt) with the penetration p > 0 and c_s = 2 zeta sqrt(k_s m). zeta fixes the coefficient of
-restitution whatever the stiffness is. The damper's jump at touch-down is averaged over one integration step.
+N = max(0, k_s p + c_s dp/dt) with the penetration p > 0 and c_s = 2 zeta sqrt(k_s m). zeta determines the
+coefficient of restitution for any stiffness. The damper's jump at touch-down is averaged over one integration step.
 """
 
 import math
@@ -13,7 +13,7 @@ def kernel(x, v, t, f, stiffness, damping_ratio, position, side, mass, step):
     direction = 1.0 if side > 0.0 else -1.0
     depth = direction * (x - position)
     closing = direction * v
-    half = 0.5 * abs(v) * step  # half of the way travelled in one step
+    half = 0.5 * abs(v) * step  # half of the travel in one step
     if depth >= half:
         touching = 1.0
     elif depth <= -half:
@@ -25,7 +25,7 @@ def kernel(x, v, t, f, stiffness, damping_ratio, position, side, mass, step):
 
 
 def starts(scales):
-    """A soft stop some way in, and a stiff one that is hardly touched, at either end."""
+    """A soft stop within the travel, and a stiff one that is hardly reached, at either end."""
     travel = scales.high - scales.low
     return [
         {"stiffness": stiffness * scales.stiffness, "damping_ratio": 0.1, "position": place, "side": side}

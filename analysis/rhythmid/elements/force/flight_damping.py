@@ -1,6 +1,6 @@
 """Flight damping: F = -c_f v for v <= 0, the phase in which the paper's switched damper is off.
 
-The force is continuous at the switch; only its slope jumps. Together with a free stance damping it spans the same
+The force is continuous at the switch; only its slope jumps. Together with a free stance damping it gives the same
 models as a viscous damper in both phases.
 """
 
@@ -24,7 +24,7 @@ ELEMENT = Element(
     starts=lambda s: [{"damping": 0.02 * s.damping}],
     also_known_as=("rebound damping", "asymmetric damping"),
     family="damping",
-    # for τ_m → 0; of a mode far below the motion, with the stance damping taking up the rest
+    # for τ_m → 0; for a mode far below the motion, with the stance damping absorbing the rest
     special_case_of=("viscoelastic_relaxation", "second_mode"),
     same_beside={"switched_damper": "viscous_damper"},
     confusable={

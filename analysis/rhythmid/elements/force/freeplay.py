@@ -1,8 +1,8 @@
 """Freeplay: the linear spring engages only outside a gap b around its rest length, as in a worn joint.
 
 As an addition to the nominal spring: F = +k clip(e, -b/2, b/2), which leaves -k (e -/+ b/2) outside the gap and
-nothing inside. Under a weight the spring works on one side of the gap: with that edge out of reach all that is left is a
-constant force, so the search keeps an edge within the travel where the rest length is known.
+zero inside. Under a weight the spring works on one side of the gap. If that edge is out of reach, only a constant
+force remains. So the search keeps an edge within the travel where the rest length is known.
 """
 
 from math import inf

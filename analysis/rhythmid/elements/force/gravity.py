@@ -1,7 +1,7 @@
 """Gravity along the axis of motion: F = -m g.
 
-Along one axis it is indistinguishable from a constant force or from the spring's rest length; it is a nominal element
-with a known value.
+Along one axis it is indistinguishable from a constant force or from the spring's rest length. It is a nominal
+element with a known value.
 """
 
 from rhythmid.elements.element import Element, Parameter

@@ -1,7 +1,7 @@
-"""Loss of ground contact: the leg's forces vanish, wholly or in part, while it is longer than its rest length.
+"""Loss of ground contact: the leg's forces vanish, fully or partly, while it is longer than its rest length.
 
-A modifier: all forces of the leg are multiplied by 1 - rho for e = x - rest length > 0. A damped leg's force jumps
-there; the jump is averaged over one integration step, with the share of the step after lift-off told by the speed.
+A modifier: all forces of the leg are multiplied by 1 - rho for e = x - rest length > 0. The force of a damped leg
+jumps there. The jump is averaged over one integration step; the speed gives the share of the step after lift-off.
 """
 
 from rhythmid.elements.element import STEP, Element, Parameter
@@ -9,7 +9,7 @@ from rhythmid.elements.element import STEP, Element, Parameter
 
 def kernel(leg, x, v, t, f, loss, rest_length, step):
     e = x - rest_length
-    half = 0.5 * abs(v) * step  # half of the way travelled in one step
+    half = 0.5 * abs(v) * step  # half of the travel in one step
     if e >= half:
         airborne = 1.0
     elif e <= -half:

@@ -1,7 +1,8 @@
-"""Load-dependent friction of a gear or a bearing: F = -mu |f| sgn(v), with f the actuator force it transmits.
+"""Load-dependent friction of a gear or a bearing: F = -mu |f| sgn(v), with f the transmitted actuator force.
 
-Only the motor loads it; where gravity, springs or an attached machine load the gear from the other side, see
-`transmitted_load_friction`. It comes on top of the load-free level, which is a `coulomb_friction` of its own. The sign is regularised as there.
+Only the motor loads it. For gravity, springs or an attached machine that load the gear from the other side, see
+`transmitted_load_friction`. It adds to the load-free level, which is a separate `coulomb_friction`. The sign is
+regularised as there.
 """
 
 import math

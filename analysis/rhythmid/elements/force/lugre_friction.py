@@ -1,12 +1,12 @@
-"""LuGre friction: bristles that bend before they slide, with the Stribeck curve as their steady state.
+"""LuGre friction: bristles that bend before they slide, with the Stribeck curve as steady state.
 
 F = -(sigma_0 z + sigma_1 dz/dt), dz/dt = v - sigma_0 |v| z / g(v), g(v) = F_c [1 + (r - 1) exp(-(v / v_s)^2)], written
 with the presliding displacement z_c = F_c / sigma_0, the bristle's damping time T = sigma_1 / sigma_0 and the state
-z / z_c. A viscous part is a `viscous_damper` of its own. Where the mass travels more than z_c in one integration step,
-the bristles bend over that travel instead, which leaves the steady state as it is.
+z / z_c. A viscous part is a separate `viscous_damper`. Where the mass travels more than z_c in one integration
+step, the bristles bend over that travel instead, which does not change the steady state.
 
-Five parameters are too many to search for: it is a plant's friction, or the refinement to try by hand where both
-`stribeck_friction` and `elastoplastic_hysteresis` have been named.
+Five parameters are too many for the search. Use it as the friction of a plant, or try it by hand where both
+`stribeck_friction` and `elastoplastic_hysteresis` have been reported.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Gravity of a pendulum or a robot's link: torque F = -G sin(x - x_r), with G = m g l and x_r the hanging position.
 
-For rotational machines: x is an angle in rad. A candidate from 0.2 rad of motion about the middle on: below, the sine is a
-spring to within 0.7 % of its force.
+For rotational machines: x is an angle in rad. A candidate for motions of at least 0.2 rad about the middle: below,
+the sine is linear to within 0.7 % of its force.
 """
 
 import math
@@ -13,13 +13,13 @@ def kernel(x, v, t, f, moment, reference):
     return -moment * math.sin(x - reference)
 
 
-LEAST_SWING = (
-    0.2  # [rad] amplitude a below which the sine and a line differ by less than a^2 / 6, 0.7 % of the force
-)
+# [rad] amplitude a below which the sine and a line differ by less than a^2 / 6, 0.7 % of the force
+LEAST_SWING = 0.2
 
 
 def starts(scales):
-    """Hanging at the middle of the motion, and turned from there: an arm's link may hang outside of its travel. Of a small motion not at all."""
+    """Hanging at the middle of the motion, and rotated from there: an arm's link may hang outside its travel. None
+    for a small motion."""
     if 0.5 * (scales.high - scales.low) < LEAST_SWING:
         return []
     moment = max(0.1 * scales.stiffness, 0.1 * scales.effort)

@@ -1,14 +1,15 @@
-"""Periodic disturbance from outside: F = a sin(2 pi f t + phi), at a frequency that is not locked to the cycle.
+"""External periodic disturbance: F = a sin(2 pi f t + phi), at a frequency that is not locked to the cycle.
 
-(a, phi) and (-a, phi + pi) are the same, so a is kept positive. Over a record of length T the fit in f has one minimum
-every 1/T: starts are useful from a residual's spectrum, whose strongest line comes first; the others cover a guess.
+(a, phi) and (-a, phi + pi) are equivalent, so a is kept positive. Over a record of length T the fit in f has one
+minimum every 1/T. The starts come from the residual's spectrum, strongest line first; the others cover a guess.
 """
 
 import math
 
 from rhythmid.elements.element import Element, Parameter
 
-FEWEST_PERIODS = 5  # in the longest record, from which a line tells more than a phase and a trend
+# in the longest record; with fewer, a line cannot be distinguished from a phase and a trend
+FEWEST_PERIODS = 5
 
 
 def kernel(x, v, t, f, amplitude, frequency, phase):
@@ -40,7 +41,8 @@ ELEMENT = Element(
     acts="body",
     size="amplitude",
     starts=starts,
-    # with fewer periods in a record its three parameters follow any slow law of the motion; beyond half the rate nothing is sampled
+    # with fewer periods in a record its three parameters fit any slow function of time; the upper limit is half the
+    # sample rate
     ranges=lambda s: {"frequency": (FEWEST_PERIODS / s.duration, 0.5 / s.period)},
     also_known_as=("hum", "rotating imbalance", "external vibration"),
     family="disturbance",

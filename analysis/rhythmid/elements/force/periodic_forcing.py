@@ -1,6 +1,6 @@
-"""Periodic forcing f0(t) = A cos(2 pi f t + phi), generated on the robot: what keeps the machine on its limit cycle.
+"""Periodic forcing f0(t) = A cos(2 pi f t + phi), generated on the robot: it keeps the machine on its limit cycle.
 
-It is added to the command in front of the actuator. A record that holds the forcing as a channel needs no such element.
+It is added to the command before the actuator. A record with the forcing as a channel needs no such element.
 """
 
 import math

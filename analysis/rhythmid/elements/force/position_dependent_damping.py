@@ -1,7 +1,7 @@
 """Position-dependent damping: F = -c_x (x - x_r)^n v, for instance a tapered dashpot or an eddy-current brake.
 
-Moving x_r adds plain viscous damping, so with n = 1 and a free viscous damper x_r is arbitrary. The sign of c_x is
-free: another damper keeps the total positive.
+A shift of x_r adds plain viscous damping, so with n = 1 and a free viscous damper x_r is arbitrary. The sign of c_x
+is free: another damper keeps the total positive.
 """
 
 import math

@@ -1,9 +1,9 @@
 """Position ripple: F = A sin(2 pi x / lambda + phi), for instance the cogging of a linear motor or an eccentric gear.
 
 (A, phi) and (-A, phi + pi) are the same ripple, so A is kept positive. A fit in lambda has one minimum for every
-period that fits into the range of motion: it needs a grid of starts, and where a rotor turns many times the lines over
-position that are left. Fewer than two periods in the travel repeat nothing: such a force is a smooth law of the position, which springs
-that harden or soften describe as well.
+period that fits into the range of motion. So it needs a grid of starts and, where a rotor makes many turns, the
+spectral lines of the residual over position. With fewer than two periods in the travel nothing repeats: such a
+force is a smooth function of the position, which hardening or softening springs describe as well.
 """
 
 import math

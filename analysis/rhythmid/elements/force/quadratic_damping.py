@@ -1,6 +1,6 @@
 """Quadratic damping of an orifice: F = -c_2 v |v|, v the speed of the mass relative to the base that it stands on.
 
-A hydraulic damper moves with its base; the air that drags on the mass does not. Where the base stands still the two are one.
+A hydraulic damper moves with its base; the drag of air on the mass does not. On a fixed base the two are equivalent.
 """
 
 from dataclasses import replace

@@ -1,4 +1,5 @@
-"""Quintic stiffness: F = -k_5 e^5 with e = x - rest length: what a hardening spring adds at the largest amplitudes."""
+"""Quintic stiffness: F = -k_5 e^5 with e = x - rest length: the additional force of a hardening spring at the
+largest amplitudes."""
 
 from rhythmid.elements.element import Element, Parameter
 

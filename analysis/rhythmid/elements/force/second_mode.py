@@ -1,9 +1,9 @@
 """Second mode: a mass m_2 attached to the first by a spring and a damper (a loose part, a payload, a flexible mount).
 
 F = k_2 (q - x) + c_2 (dq/dt - v), m_2 d2q/dt2 = -F, with k_2 = m_2 w^2, c_2 = 2 zeta m_2 w, w = 2 pi f_2. q is the
-attached mass's position, measured from its rest relative to the first mass; its weight is a constant force, which the
-spring's rest length takes. A mode too fast for the integration step (w h > 1) is slowed down to w = 1 / h, where it
-is an added mass all the same. A fit in f_2 has local minima: it needs a grid of starts.
+attached mass's position, measured from its rest relative to the first mass. Its weight is a constant force, which
+the spring's rest length absorbs. A mode too fast for the integration step (w h > 1) is slowed down to w = 1 / h;
+there it is still an added mass. A fit in f_2 has local minima, so it needs a grid of starts.
 """
 
 import math
@@ -30,18 +30,19 @@ RATIOS = (
     4.0,
     4.8,
     5.6,
-)  # of the mode's frequency to the mass's on its spring
+)  # ratios of the mode's frequency to that of the mass on its spring
 DAMPING_RATIOS = (0.1, 0.01)  # of a joint or a payload, and of a metal structure
 SHARE = 0.03  # of the first mass
 FACTORS_OF_LINE = (
     1.0,
     0.97,
     1.03,
-)  # of the strongest line left: a mode answers beside the line that it splits off
+)  # ratios to the strongest remaining line: the mode is next to the line that it causes
 
 
 def starts(scales):
-    """At the strongest line that is left, and on a grid; lightly damped ones close to the line, where alone they show."""
+    """At the strongest line of the residual, and on a grid; lightly damped ones only near the line, where they are
+    visible."""
     line = scales.residual_frequency
     found = [(ratio * line, damping) for damping in DAMPING_RATIOS for ratio in FACTORS_OF_LINE if line > 0.0]
     found += [(ratio * scales.natural_frequency, DAMPING_RATIOS[0]) for ratio in RATIOS]
@@ -74,8 +75,8 @@ ELEMENT = Element(
     size="mass",
     width="damping_ratio",
     starts=starts,
-    # slower than the motion it is a mass at rest, and its damper a viscous one; slower than a record, a force that its free
-    # start makes; faster than the samples, an added mass; overdamped, something that relaxes
+    # slower than the motion it is a mass at rest with a viscous damper; slower than a record it is a force set by
+    # its initial state; faster than the samples it is an added mass; overdamped it is a relaxation
     ranges=lambda s: {
         "frequency": (max(0.3 * min(s.natural_frequency, s.frequency), 1.0 / s.duration), 0.5 / s.period),
         "damping_ratio": (0.0, 1.0),

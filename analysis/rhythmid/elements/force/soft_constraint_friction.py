@@ -1,16 +1,17 @@
 """Dry friction as a physics engine's soft constraint: F = −clip(m (a + v / τ) / s, ±F_c), with the mass's own acceleration a.
 
-MuJoCo's `frictionloss` is this law, not F_c sgn v. Its constraint asks for the acceleration −b v, b = 2 / (d_max timeconst), with
-the force −(a + b v) / R and never more than the friction loss; R = (1 − d) / d times the joint's `dof_invweight0`, with d the first
-number of `solimp`. So τ = 1 / b (9.5 ms with its defaults) and s = m R (1/9 where nothing else moves with the joint): the sign turns
-τ earlier than the velocity does, and a light joint creeps at up to v_t = F_c τ s / m.
+MuJoCo's `frictionloss` is this law, not F_c sgn v. Its constraint requests the acceleration −b v, b = 2 / (d_max
+timeconst), with the force −(a + b v) / R, limited to the friction loss. R = (1 − d) / d times the joint's
+`dof_invweight0`, with d the first number of `solimp`. So τ = 1 / b (9.5 ms with its defaults) and s = m R (1/9
+where nothing else moves with the joint). The sign reverses τ earlier than the velocity does, and a light joint
+creeps at up to v_t = F_c τ s / m.
 
-The force needs the acceleration that it takes part in. With a = a₀ + F y, where a₀ is what the acceleration would be without it and
-the yielding y the inverse of the mass, F = −clip(F_c (v + τ a₀) / (v_t + F_c τ y), ±F_c). Along a measured motion the acceleration
-contains the force already, and y = 0.
+The force depends on the acceleration to which it contributes. With a = a₀ + F y, where a₀ is the acceleration
+without it and the yielding y the inverse of the mass, F = −clip(F_c (v + τ a₀) / (v_t + F_c τ y), ±F_c). Along a
+measured motion the acceleration already contains the force, and y = 0.
 
-Lead and softness are the engine's numbers and hardly anybody changes them, so the search keeps near them. A friction with any lead
-would follow what stamps are out by, and one with any softness a viscous damper.
+Lead and softness are the engine's numbers and are hardly ever changed, so the search keeps close to them. A
+friction with a free lead would fit timing errors of stamps, and one with a free softness a viscous damper.
 """
 
 import math
@@ -19,8 +20,9 @@ from rhythmid.elements.element import Element, Parameter
 
 LEAD = 0.0095  # [s] with MuJoCo's defaults, 0.95 * 0.02 s / 2: d_max and timeconst of its solimp and solref
 SOFTNESS = 1.0 / 9.0  # with MuJoCo's defaults, (1 - d) / d with d = 0.9
-NEAR_LEAD = (0.9, 1.1)  # times LEAD, between which a search has it: recorded motions give it within 5 %
-NEAR_SOFTNESS = (0.25, 4.0)  # times SOFTNESS, the same: the joints beside one make it seem lighter or heavier
+NEAR_LEAD = (0.9, 1.1)  # range of the search, times LEAD: recorded motions give it within 5 %
+# range of the search, times SOFTNESS: neighbouring joints make a joint seem lighter or heavier
+NEAR_SOFTNESS = (0.25, 4.0)
 
 
 def kernel(acceleration, yielding, x, v, t, f, force, softness, lead, mass):

@@ -1,4 +1,5 @@
-"""Stiffness drift: the linear spring's stiffness changes with time, k (1 + alpha t), by temperature, wear or creep.
+"""Stiffness drift: the linear spring's stiffness changes with time, k (1 + alpha t), because of temperature, wear
+or creep.
 
 t is the record's time; the drift begins at its start.
 """

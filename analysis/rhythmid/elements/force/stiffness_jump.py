@@ -1,7 +1,7 @@
 """Stiffness jump: the linear spring's stiffness becomes k (1 + delta) at the time t_s (a crack, a slipped clamp).
 
-The step is spread over one integration step, so that the motion depends smoothly on t_s. A fit in t_s has a minimum for
-every period of the motion or of the forcing: it needs a grid of starts, and hops from there.
+The step is spread over one integration step, so that the motion depends smoothly on t_s. A fit in t_s has a minimum
+for every period of the motion or of the forcing, so it needs a grid of starts and hops between minima.
 """
 
 from math import inf

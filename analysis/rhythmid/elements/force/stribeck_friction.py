@@ -1,7 +1,8 @@
 """Stribeck friction: a Coulomb level that rises towards v = 0, F = -F_c [1 + (r - 1) exp(-(v / v_s)^2)] sgn(v).
 
-r is the ratio of static to kinetic friction, so the rise F_s of the usual form is (r - 1) F_c. The sign is regularised
-as in Coulomb friction, and its transition speed v_t is estimated too: v_t < v_s, or the rise cannot be seen.
+r is the ratio of static to kinetic friction, so the rise F_s of the usual form is (r - 1) F_c. The sign is
+regularised as in Coulomb friction. Its transition speed v_t is estimated, too; with v_t >= v_s the rise is not
+identifiable.
 """
 
 import math

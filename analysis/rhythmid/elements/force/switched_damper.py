@@ -1,6 +1,6 @@
-"""Direction-switched viscous damper of the paper's hopper: damping in stance (v > 0), another in flight.
+"""Direction-switched viscous damper of the paper's hopper: one damping in stance (v > 0), another in flight.
 
-The switch sits at v = 0, where the damper's force is zero: the force is continuous, its slope is not.
+The switch is at v = 0, where the damper's force is zero: the force is continuous, its slope is not.
 """
 
 from math import inf

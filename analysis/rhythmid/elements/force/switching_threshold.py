@@ -1,11 +1,12 @@
 """Switching threshold: the direction-switched damper turns on at v = v_th instead of v = 0.
 
-A modifier of the leg's forces: it adds -(c_s - c_f) v ([v > v_th] - [v > 0]) to the nominal damper. The force now jumps at
-the switch; both brackets rise over the transition and the speed gained in one integration step, as the forces on the mass
-tell. So the effect vanishes exactly at v_th = 0 and can be differentiated with respect to v_th. Where the speed turns round
-near the threshold a sharp switch has many minima: fits begin with a wide transition, which they estimate. A transition counts
-up to half the threshold: a wider one is no switch, but a curve of the damper that can stand for any friction.
-The effect grows with the square of small thresholds: fits need starts of physical size.
+A modifier of the leg's forces: it adds -(c_s - c_f) v ([v > v_th] - [v > 0]) to the nominal damper. The force now
+jumps at the switch. Both brackets rise over the transition and the speed gained in one integration step, as
+computed from the forces on the mass. So the effect vanishes exactly at v_th = 0 and can be differentiated with
+respect to v_th. Where the speed reverses near the threshold, a sharp switch has many local minima, so fits start
+with a wide transition and estimate it. A transition is limited to half the threshold: a wider one is no switch, but
+a smooth damper curve that can represent any friction. The effect grows with the square of small thresholds, so fits
+need starts of physical size.
 """
 
 import math
@@ -14,7 +15,7 @@ from rhythmid.elements.element import STEP, Element, Parameter
 
 
 def kernel(leg, x, v, t, f, threshold, transition, stance, flight, mass, gravity, step):
-    gained = abs((leg + f) / mass - gravity) * step  # speed, in one step
+    gained = abs((leg + f) / mass - gravity) * step  # speed gained in one step
     half = min(transition, 0.5 * abs(threshold)) + max(0.5 * gained, 1e-300)
     beyond = min(1.0, max(0.0, 0.5 + 0.5 * (v - threshold) / half))
     upward = min(1.0, max(0.0, 0.5 + 0.5 * v / half))

@@ -1,11 +1,11 @@
-"""Friction of a gear that grows with the load that it transmits: F = -|K_m f - K_e F_e| sgn(v).
+"""Friction of a gear that grows with the transmitted load: F = -|K_m f - K_e F_e| sgn(v).
 
-Both sides load the gear: the motor with its force f, the machine with F_e, the sum of the forces on the mass that are
-neither the actuator's nor losses (gravity, springs, what is attached). They add where the motor holds or lifts a load, for
-then F_e has the other sign; where it pushes the load that pushes it (back-driving) the teeth are relieved. K_m and K_e
-differ because a gear is not as efficient in both directions: mu = K_m, r = K_e / K_m. With r = 0 it is
-`load_dependent_friction`. It comes on top of the load-free level, a `coulomb_friction` of its own, whose regularised sign
-it shares.
+Both sides load the gear: the motor with its force f, and the machine with F_e, the sum of the forces on the mass
+other than the actuator's and losses (gravity, springs, attached parts). The two add where the motor holds or lifts
+a load, because F_e then has the opposite sign. Where the load drives the motor (back-driving), the teeth are
+relieved. K_m and K_e differ because a gear is not equally efficient in both directions: mu = K_m, r = K_e / K_m.
+With r = 0 it is `load_dependent_friction`. It adds to the load-free level, a separate `coulomb_friction`, and
+shares its regularised sign.
 """
 
 import math

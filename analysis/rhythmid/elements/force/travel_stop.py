@@ -1,4 +1,5 @@
-"""Travel stop: the end stop of a suspension. It rides on the base that the mass stands on; its contact is `end_stop_contact`'s."""
+"""Travel stop: the end stop of a suspension. It moves with the base on which the mass stands; its contact is that
+of `end_stop_contact`."""
 
 from dataclasses import replace
 

@@ -1,7 +1,7 @@
 """Viscoelastic relaxation: a Maxwell branch, F = -k_m (x - w), dw/dt = (x - w) / tau_m.
 
-With a linear spring it is the standard linear solid. For tau_m -> 0 it is a viscous damper k_m tau_m; a relaxation
-shorter than one integration step is computed as that limit, scaled so that its damping at low frequency is right.
+With a linear spring it is the standard linear solid. For tau_m -> 0 it is a viscous damper k_m tau_m. A relaxation
+shorter than one integration step is computed as that limit, scaled to the correct damping at low frequency.
 The branch starts relaxed.
 """
 
@@ -37,7 +37,8 @@ ELEMENT = Element(
         }
         for w in (0.15, 0.7, 3.0)
     ],
-    ranges=lambda s: {"time_constant": (0.0, 0.25 * s.duration)},  # slower it shows but once, as a drift
+    # a slower one relaxes only once in the record, like a drift
+    ranges=lambda s: {"time_constant": (0.0, 0.25 * s.duration)},
     also_known_as=("Maxwell branch", "Zener solid", "standard linear solid", "creep"),
     family="damping",
     confusable={

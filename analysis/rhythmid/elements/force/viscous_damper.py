@@ -21,8 +21,9 @@ ELEMENT = Element(
     against="base",
     also_known_as=("dashpot", "linear damper"),
     family="damping",
-    special_case_of=("viscoelastic_relaxation", "second_mode"),  # for τ_m → 0; of a mode far below the motion
-    needless_with=("switched_damper",),  # flight damping and a free stance damping make it up
+    # for τ_m → 0; for a mode far below the motion
+    special_case_of=("viscoelastic_relaxation", "second_mode"),
+    needless_with=("switched_damper",),  # equivalent to flight damping and a free stance damping
     confusable={
         "coulomb_friction": "one amplitude only: Coulomb's apparent damping falls as 1/amplitude",
         "quadratic_drag": "one amplitude only: drag's apparent damping grows with amplitude",

@@ -1,9 +1,9 @@
 """Measurement jitter: every sample is older than its stamp by its own random delay, uniform on [0, sqrt(12) sigma].
 
-The draw is a function of the stamp and the seed alone, so that a run can be repeated; the simulator keeps the samples
-in order. The mean, sqrt(3) sigma, acts as measurement delay. What remains is noise of standard deviation sigma |v|.
-A simulation with another seed does not repeat the real draw: sigma is estimated from the residual's variance against
-v^2, and from the roll-off of |H_m| with w, not by output error.
+The draw is a function of the stamp and the seed alone, so a run is reproducible; the simulator keeps the samples in
+order. The mean, sqrt(3) sigma, acts as measurement delay. The rest is noise of standard deviation sigma |v|. A
+simulation with another seed does not reproduce the real draw. So sigma is not estimated by output error, but from
+the residual's variance as a function of v^2, and from the roll-off of |H_m| with w.
 """
 
 import math

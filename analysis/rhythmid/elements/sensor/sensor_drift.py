@@ -1,6 +1,6 @@
-"""Sensor drift: y = x + b t, a zero that wanders with time.
+"""Sensor drift: y = x + b t, a zero that drifts with time.
 
-t is when the measurement was taken, in the record's time, zero at its start.
+t is the time of the measurement in the record's time, zero at its start.
 """
 
 from rhythmid.elements.element import Element, Parameter

@@ -1,6 +1,6 @@
-"""Sensor gain: y = g x, an error of scale.
+"""Sensor gain: y = g x, a scale error.
 
-With a free mass the gain only scales mass, damping and stiffness, so it is calibration and not missing physics.
+With a free mass the gain only scales mass, damping and stiffness, so it is calibration and no missing effect.
 """
 
 from math import inf
@@ -21,7 +21,7 @@ ELEMENT = Element(
     kernel=kernel,
     size="gain",
     absent=1.0,
-    candidate=False,  # the same as another mass, damping, stiffness and rest length
+    candidate=False,  # equivalent to another mass, damping, stiffness and rest length
     starts=lambda s: [{"gain": 1.02}],
     also_known_as=("scale error", "sensitivity error"),
     family="calibration",

@@ -1,8 +1,9 @@
 """Sensor lag: first order, tau_s dy/dt = x - y (an anti-alias filter, a slow transducer, a camera's exposure).
 
-A lag shorter than one integration step h is computed with the time constant h and a direct share 1 - tau_s / h, whose
-transfer function agrees to first order in frequency: the effect vanishes exactly at tau_s = 0, grows smoothly from
-there, and stays stable. It starts as if the machine had moved at its initial speed all along: y = x - tau_s v.
+A lag shorter than one integration step h is computed with the time constant h and a direct share 1 - tau_s / h,
+whose transfer function agrees to first order in frequency. So the effect vanishes exactly at tau_s = 0, grows
+smoothly from there, and is stable. It starts as if the machine had always moved at its initial speed: y = x - tau_s
+v.
 """
 
 from math import inf

@@ -1,6 +1,6 @@
-"""Sensor nonlinearity: y + beta (y - x_r)^2, the curvature of a characteristic.
+"""Sensor nonlinearity: y + beta (y - x_r)^2, the curvature of a sensor characteristic.
 
-Moving x_r adds a gain and an offset. Where mass and rest length are free these are absorbed, and x_r is arbitrary.
+A shift of x_r adds a gain and an offset. Where mass and rest length are free, these are absorbed, and x_r is arbitrary.
 """
 
 from rhythmid.elements.element import Element, Parameter
@@ -22,7 +22,8 @@ ELEMENT = Element(
     kernel=kernel,
     size="coefficient",
     starts=lambda s: [{"coefficient": 0.01 / s.position, "reference": s.centre}],
-    ranges=lambda s: {"reference": (s.low, s.high)},  # elsewhere it is a gain and an offset within the motion
+    # outside the travel it is a gain and an offset within the motion
+    ranges=lambda s: {"reference": (s.low, s.high)},
     also_known_as=("characteristic curve", "sensor curvature"),
     family="sensor nonlinearity",
     confusable={

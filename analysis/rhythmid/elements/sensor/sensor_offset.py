@@ -1,6 +1,6 @@
 """Sensor offset: y = x + o.
 
-A free rest length absorbs it exactly, so it is calibration and not missing physics.
+A free rest length absorbs it exactly, so it is calibration and no missing effect.
 """
 
 from rhythmid.elements.element import Element, Parameter
@@ -18,7 +18,7 @@ ELEMENT = Element(
     parameters=(Parameter("offset", "m", "offset o", default=0.0),),
     kernel=kernel,
     size="offset",
-    candidate=False,  # the same as another rest length
+    candidate=False,  # equivalent to another rest length
     starts=lambda s: [{"offset": 0.05 * s.position}],
     also_known_as=("zero error", "bias"),
     family="calibration",

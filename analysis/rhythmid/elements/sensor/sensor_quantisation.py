@@ -1,7 +1,7 @@
 """Sensor quantisation: samples are rounded to whole steps q (an encoder's counts, a converter's bits).
 
-While the motion crosses many steps it is white noise of variance q^2 / 12 and no bias; it is seen in the differences
-between samples, which are whole multiples of q, and not in a noise-free simulation.
+While the motion crosses many steps it is white noise of variance q^2 / 12 without bias. It shows in the differences
+between samples, which are whole multiples of q, but not in a noise-free simulation.
 """
 
 from math import inf

@@ -1,7 +1,7 @@
 """Clock skew: the clock that stamps the measurements runs at 1 + epsilon times the robot's.
 
-A measurement stamped t was taken at t / (1 + epsilon). The limit cycle's phase drifts against the record's time;
-commands and forcing keep the robot's time.
+A measurement stamped t was taken at t / (1 + epsilon). The limit cycle's phase drifts relative to the record's
+time; commands and forcing keep the robot's time.
 """
 
 from rhythmid.elements.element import Element, Parameter

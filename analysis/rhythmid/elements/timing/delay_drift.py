@@ -1,4 +1,4 @@
-"""Delay drift, on the measurement's side: the measurement delay grows with time, tau_y + r t.
+"""Delay drift of the measurement: the measurement delay grows with time, tau_y + r t.
 
 Its counterpart for commands is `input_delay_drift`. A clock skew of epsilon = r / (1 - r) gives the same record: the two are
 observationally equivalent without knowledge of the clocks, and are reported together.

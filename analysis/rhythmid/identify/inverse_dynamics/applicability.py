@@ -1,5 +1,5 @@
-"""Whether records can be scored by their effort, and whether a free run would mean something: both are questions of
-identifiability, not of how the motion looks."""
+"""Whether records can be scored by their effort, and whether a free run is meaningful. Both are questions of
+identifiability, not of the form of the motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,25 +17,29 @@ from rhythmid.record.record import Record
 from rhythmid.simulation.effect import Path, effect_along
 from rhythmid.simulation.generated_source import OutputKind
 
-# of the scaled normal equations' root, beyond which a robot's parameters are said not to be excited (K. Schröer, in: Robot
-# Calibration, Chapman & Hall, 1993; M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 aim below it)
+# condition number of the scaled regressor above which a robot's parameters are not sufficiently excited (K.
+# Schröer, in: Robot Calibration, Chapman & Hall, 1993; M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 aim
+# below it)
 CONDITION = 100.0
-EXPLAINED_BY_MOTION = 0.5  # of the effort's power that any map of the motion has to explain, or it is not the motion that the effort makes
-# of the inertial force that the effort varies by at least: below it the machine swings by itself and the small difference of two
-# large terms is weighed (a resonance of 10 % damping is driven by a fifth of its inertial force)
+# least share of the effort's power that a free map of the motion explains; with less, this effort does not make the
+# motion
+EXPLAINED_BY_MOTION = 0.5
+# least variation of the effort relative to the inertial force: below it the machine swings freely, and the balance
+# is a small difference of two large terms (a resonance of 10 % damping is driven by a fifth of its inertial force)
 LIGHT = 0.2
-POINTS = 50  # positions at which a restoring force is looked for
+POINTS = 50  # positions at which a restoring force is evaluated
 
 
 @dataclass(frozen=True)
 class Applicability:
-    """Whether the effort can be scored, and why or why not.
+    """Whether the effort can be scored, with the reasons.
 
-    `condition` is that of the scaled columns, `explained` the share of the effort's power that a free map explains, `effort_share`
-    the effort's variation as a share of the inertial force. `restoring` says whether the model holds what is measured anywhere,
-    `closed` whether a controller does: of a machine with a restoring force and without a controller a long free run means
-    something. `recorded` says whether there are rows of effort at all, `notes` what was interpolated of them. `balance` holds the rows;
-    it is None where a free run comes first: those of long records are large, and a search makes them again where it has to.
+    `condition` is the condition number of the scaled columns, `explained` the share of the effort's power that a
+    free map explains, `effort_share` the effort's variation as a share of the inertial force. `restoring` says
+    whether the model has a restoring force for the measured quantity, `closed` whether it has a controller. A long
+    free run is meaningful for a machine with a restoring force and without a controller. `recorded` says whether
+    there are rows of effort, `notes` which of them were interpolated. `balance` holds the rows. It is None where a
+    free run comes first: the rows of long records are large, and a search rebuilds them where needed.
     """
 
     applies: bool
@@ -52,13 +56,13 @@ class Applicability:
 
     @property
     def free_run_means_something(self) -> bool:
-        """Whether a long free run of the model would not add up every small disturbance."""
+        """Whether a long free run of the model does not accumulate every small disturbance."""
         return self.restoring and not self.closed
 
 
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 def applicable(records: Sequence[Record], model: Model) -> Applicability:
-    """Whether these records can be scored by the effort that the model predicts."""
+    """Whether these records can be scored by the predicted effort of the model."""
     closed = controlled(model)
     try:
         balance = Balance.of(records, model)
@@ -95,14 +99,14 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
 
 
 def _inertial(balance: Balance, model: Model) -> float:
-    """Size (rms about its mean) of the inertial force, in the effort's unit: that of a motor's voltage, where this is one."""
+    """Size (rms about its mean) of the inertial force in the effort's unit, for example a motor's voltage."""
     heavier = model.with_values({INERTIA: 1.01 * model.mass.value})
     return float(np.std(balance.predicted(heavier) - balance.predicted(model))) / 0.01
 
 
 def restores(balance: Balance, model: Model, measured: OutputKind = "position") -> bool:
-    """Whether the model's forces push what is measured back from both ends of its range: the position at rest, or the velocity
-    of a machine of which only that is known."""
+    """Whether the model's forces push the measured quantity back from both ends of its range: the position at rest,
+    or the velocity of a machine where only the velocity is measured."""
     of_speed = measured == "velocity"
     signal = [motion.leg_velocity if of_speed else motion.leg_position for motion in balance.motions]
     span = np.linspace(float(np.min(np.concatenate(signal))), float(np.max(np.concatenate(signal))), POINTS)

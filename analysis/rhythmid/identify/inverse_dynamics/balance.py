@@ -1,8 +1,8 @@
-"""The balance of effort: what the motor must have given along the measured motion, if the model were right.
+"""The effort balance: the effort that the motor must have given along the measured motion, if the model were correct.
 
-u = m a − ΣF, with every element's force F computed along the motion that was measured, states included. The recorded effort is
-what is predicted and never stands among what predicts it: forces under load and the actuator see the effort that the model
-itself requires. One zero-phase filter acts on the recorded effort and on all that is compared with it.
+u = m a − ΣF, with every element's force F and its states computed along the measured motion. The recorded effort is
+only the quantity to predict; it is never a regressor. Forces under load and the actuator use the effort that the
+model itself requires. One zero-phase filter acts on the recorded effort and on everything that is compared with it.
 """
 
 import math
@@ -32,32 +32,36 @@ from rhythmid.simulation.effect import MAX_STEP, Path, effect_along, load_along
 from rhythmid.simulation.transport import MEASUREMENT, delays
 
 Array = NDArray[np.float64]
-STICK = 0.03  # of the fast speed, below which dry friction is set-valued: any force up to the friction (six arm joints, an axis, a frame)
-FAST = 0.95  # quantile of the speed that is called fast
-DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter for the filter's slope (Gautier et al.)
-MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again only what changed
-MANY_ROWS = 200  # of a short record that are kept at least: their correlation is allowed for
-QUARTER = 0.25  # of the shortest period of the effort, up to which a gap is bridged: a cubic beside it misses 12 % of that, 1.5 % of one twice as long
-LEAST_ROWS = 40  # rows without which nothing is estimated
-SUBSTEPS = 4  # of an element's own states in a sample of the motion, whose bandwidth has ten
-INVISIBLE = 1e-4  # of a signal that is left by a filter that it does not pass
-TESTED = 64  # samples on which it is found out whether an element's force depends on the effort
+STICK = 0.03  # share of FAST speed with set-valued dry friction (measured: six arm joints, an axis, a frame)
+FAST = 0.95  # quantile of the speed that counts as fast
+# rows per cut-off period: Nyquist rate plus a quarter for the filter's slope (Gautier et al.)
+DECIMATED = 2.5
+MEMORY = 2e8  # bytes of cached forces: a refit computes only what changed
+MANY_ROWS = 200  # least rows kept of a short record; their correlation is taken into account
+# share of the effort's shortest period up to which a gap is bridged: a cubic misses 12 % of a signal of that
+# period, 1.5 % at twice the period
+QUARTER = 0.25
+LEAST_ROWS = 40  # least number of rows for an estimate
+# integration steps of an element's states per sample of the motion (10 samples per cut-off period)
+SUBSTEPS = 4
+INVISIBLE = 1e-4  # share of a signal that remains after a filter whose pass band does not contain it
+TESTED = 64  # samples used to test whether an element's force depends on the effort
 
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """Efforts on common rows, for all models alike.
+    """Efforts on rows that are the same for all models.
 
     Attributes
     ----------
-    motions : the stretches.
-    bandwidth : the cut-offs [Hz].
-    places : of each motion, the samples that are its rows.
-    record : (n,) the record of each row, numbered in order.
+    motions : the stretches without gaps.
+    bandwidth : the cut-off frequencies [Hz].
+    places : for each motion, the indices of the samples that are its rows.
+    record : (n,) number of each row's record, in order.
     measured : (n,) the recorded effort at the rows, filtered.
-    stick_speed : below it [speed], samples are left out.
-    stuck : share of the rows that were.
-    period : sample period [s] of the records: the unit of the alignment.
+    stick_speed : speed below which samples are left out.
+    stuck : share of the rows that were left out for this reason.
+    period : sample period [s] of the records, the unit of the alignment.
     """
 
     motions: tuple[Motion, ...]
@@ -85,8 +89,9 @@ class Balance:
     def of_motions(
         cls, motions: Sequence[Motion], chosen: Bandwidth, period: float, clear: float | None = None
     ) -> "Balance":
-        """The balance of these motions, whose records were sampled every `period` [s]. With `clear`, so many periods of the cut-off are
-        left out at both ends of each motion, however little remains. Raises InputError where too few rows are left."""
+        """The balance of these motions of records with sample period `period` [s]. `clear` is the number of cut-off
+        periods to leave out at both ends of each motion, however little remains. Raises InputError where too few
+        rows are left."""
         speed = float(np.quantile(np.abs(np.concatenate([one.leg_velocity for one in motions])), FAST))
         length = sum(len(one.time) * one.period for one in motions)
         often = max(DECIMATED * chosen.effort, MANY_ROWS / length)
@@ -117,7 +122,8 @@ class Balance:
         return made
 
     def rows(self, signals: Iterable[Array], shift: float = 0.0) -> Array:
-        """Signals, one (n,) or (n, p) for each motion, filtered, at the rows, `shift` [s] later; (rows,) or (rows, p)."""
+        """Filtered signals at the rows, `shift` [s] later. One signal (n,) or (n, p) per motion gives (rows,) or
+        (rows, p)."""
         return np.concatenate(
             [
                 sampled(self.filtered(one, motion.period), places, shift / motion.period)
@@ -126,12 +132,12 @@ class Balance:
         )
 
     def filtered(self, signal: Array, period: float) -> Array:
-        """A signal (n,) or (n, p) through the filter that the effort and all that is compared with it go through."""
+        """A signal (n,) or (n, p) after the filter that the recorded effort also passes."""
         return high_pass(low_pass(signal, period, self.bandwidth.effort), period, self.bandwidth.low)
 
     @property
     def notes(self) -> list[str]:
-        """What was interpolated of each record."""
+        """Notes on what was interpolated in each record."""
         found: dict[str, list[float]] = {}
         for motion in self.motions:
             if motion.bridged:
@@ -156,7 +162,7 @@ class Balance:
 
     @property
     def mechanical(self) -> Array:
-        """(n, 3) of each row the leg's position, velocity and the acceleration, as they were measured."""
+        """Measured position, velocity and acceleration of the leg at each row, (n, 3)."""
         return np.concatenate(
             [
                 np.column_stack([m.leg_position[p], m.leg_velocity[p], m.acceleration[p]])
@@ -166,16 +172,17 @@ class Balance:
 
     @property
     def by_reference(self) -> bool:
-        """Whether the effort was not recorded, but is what a controller makes of its reference."""
+        """Whether the effort was not recorded but follows from a controller and its reference."""
         return self.motions[0].reference is not None
 
     def later(self, model: Model, alignment: float = 0.0) -> float:
-        """By how much later [s] than the rows the motion shows the effort, `alignment` [s] beyond the model's delays. What is computed from the
-        motion is not later than it: of an effort by a reference, this alone is late, see `moved`."""
+        """Time [s] by which the motion lags the effort, `alignment` [s] beyond the model's delays. It is 0 for an
+        effort computed from motion and reference: there only the reference is delayed, see `moved`."""
         return 0.0 if self.by_reference else self.shift(model) + alignment
 
     def moved(self, model: Model, alignment: float) -> list[Array]:
-        """Change (n,) of the compared effort along each motion where its reference acts `alignment` [s] later; none for a recorded effort."""
+        """Change (n,) of each motion's effort if its reference acts `alignment` [s] later; empty for a recorded
+        effort."""
         if not self.by_reference or alignment == 0.0:
             return []
         late = self.shift(model)
@@ -186,12 +193,12 @@ class Balance:
         ]
 
     def with_moved(self, rows: Array, model: Model, alignment: float) -> Array:
-        """Rows (n,) of a required effort with its reference acting `alignment` [s] later."""
+        """Rows (n,) of a required effort with the reference acting `alignment` [s] later."""
         changes = self.moved(model, alignment)
         return rows + self.rows(changes) if changes else rows
 
     def _asked(self, index: int, model: Model, late: float) -> Array:
-        """Force (n,) that the controller asks for by its reference; kept, for most refits do not change the command path."""
+        """Force (n,) commanded by the controller due to its reference. Cached: most refits keep the command path."""
         key = (index, "asked", changed_by(model), late)
         found = self._forces.get(key)
         if found is None:
@@ -201,7 +208,7 @@ class Balance:
         return found
 
     def shift(self, model: Model) -> float:
-        """By how much later [s] than the stamps of the effort the motion shows it, as the model's delays say."""
+        """Time [s] by which the motion lags the effort's timestamps, according to the model's delays."""
         slots = MEASUREMENT if controlled(model) else ("command", *MEASUREMENT)
         return sum((float(np.mean(late)) for _, late in delays(model, self.motions[0].time, *slots)), 0.0)
 
@@ -210,8 +217,8 @@ class Balance:
         return [self._required(index, model, Inversions()) for index in range(len(self.motions))]
 
     def sensitive(self, model: Model, steps: Mapping[str, float]) -> tuple[list[Array], list[list[Array]]]:
-        """The effort (n,) that the model requires along each motion, and for each named parameter its change (n,) for a unit of that, by
-        a difference over a step."""
+        """The effort (n,) that the model requires along each motion, and its derivative (n,) with respect to each
+        named parameter, by a difference over a step."""
         chains = [Inversions(with_slopes=True) for _ in self.motions]
         required = [self._required(index, model, chain) for index, chain in enumerate(chains)]
         known = [replace(chain, known=chain.made) for chain in chains]
@@ -223,12 +230,12 @@ class Balance:
         return required, changes
 
     def predicted(self, model: Model, alignment: float = 0.0) -> Array:
-        """The effort (rows,) that the model predicts, `alignment` [s] beyond the model's own delays."""
+        """The predicted effort (rows,), `alignment` [s] beyond the model's own delays."""
         rows = self.rows(self.required(model), self.later(model, alignment))
         return self.with_moved(rows, model, alignment)
 
     def estimated(self, model: Model) -> list[str]:
-        """The free parameters that the effort can tell of: the inertia, forces, and the actuator."""
+        """The free parameters on which the effort depends: inertia, forces and actuator."""
         found = []
         for name in model.free:
             if name in self.motions[0].links:
@@ -246,7 +253,7 @@ class Balance:
         return found
 
     def _passes(self, name: str, model: Model) -> bool:
-        """Whether anything of what a parameter does is left by the filter that takes slow motion away."""
+        """Whether the high-pass filter leaves any effect of a parameter."""
         value = model.value(name)
         moved = self.required(model.with_values({name: value + 1e-3 * (abs(value) or 1.0)}))
         change = [new - old for new, old in zip(moved, self.required(model), strict=True)]
@@ -254,7 +261,7 @@ class Balance:
         return bool(np.linalg.norm(self.rows(change)) > INVISIBLE * np.linalg.norm(whole))
 
     def _counts(self, term: Term, model: Model) -> bool:
-        """Whether an element plays a part in the balance; what stands for a body's parameters does so in the motions' coupling."""
+        """Whether an element is part of the balance; a body's parameters enter by the motions' coupling instead."""
         slot = term.element.slot
         if any(f"{term.label}.{name}" in self.motions[0].links for name in term.values):
             return False
@@ -298,14 +305,14 @@ class Balance:
                     required = self._before(motion, term, model, required, leg, by)
         if (
             self.by_reference
-        ):  # what the command path changes stands on this side: the rows stay the same for all models
+        ):  # the command path's effect is on this side, so that the rows stay the same for all models
             required = required + motion.effort - self._asked(index, model, self.shift(model))
         return required
 
     def _with_load(
         self, motion: Motion, terms: Sequence[Term], model: Model, without: Array, leg: Array, by: Inversions
     ) -> Array:
-        """The effort (n,) that makes up for the forces of elements that it is the load of; `without` them it is known."""
+        """The effort (n,) with the forces that depend on it as load; `without` (n,) is the effort without them."""
         zero = np.zeros(len(motion.time))
         load = load_along(model, motion.path(zero, leg, zero, True))
 
@@ -318,7 +325,7 @@ class Balance:
     def _before(
         self, motion: Motion, term: Term, model: Model, after: Array, leg: Array, by: Inversions
     ) -> Array:
-        """The signal (n,) that went into an actuator or command element for `after` to come out."""
+        """The input (n,) of an actuator or command element whose output is `after` (n,)."""
 
         def comes_out(into: Array) -> Array:
             return into + self._along(motion, term, model, after, leg, into)
@@ -331,7 +338,7 @@ class Balance:
     ) -> Array:  # fmt: skip
         values = term.numbers
         of_leg = term.element.acts not in ("body", "drive")
-        # a motion without anything fast moves an element's states smoothly; what has none takes the simulator's own step
+        # the filtered motion moves states smoothly; elements without states take the simulator's step
         step = max(MAX_STEP, motion.period / SUBSTEPS) if term.element.states else MAX_STEP
         path = motion.path(effort, leg, signal, of_leg)
         if load is not None:
@@ -339,7 +346,7 @@ class Balance:
         return effect_along(term.element, values, model, path, step)
 
     def _force(self, index: int, term: Term, model: Model) -> Array:
-        """Force (n,) of an element that sees nothing but the motion; kept, for most refits change but one."""
+        """Force (n,) of an element that depends only on the motion. Cached: most refits change one element."""
         borrowed = tuple(model.borrowed(source, default) for source, default in term.element.borrows.values())
         key = (
             index,
@@ -357,7 +364,7 @@ class Balance:
         return found
 
     def _sees_effort(self, term: Term, model: Model) -> bool:
-        """Whether an element's force depends on the actuator's."""
+        """Whether an element's force depends on the actuator's force."""
         name = term.element.name
         if name not in self._sensitive:
             wave = np.sin(np.linspace(0.0, 20.0, TESTED))
@@ -374,9 +381,10 @@ class Balance:
 
 
 def _bridged(records: Sequence[Record], model: Model) -> tuple[list[Stretch], Bandwidth]:
-    """The stretches of these records, bridged where gaps are short beside what their effort contains; and their bandwidth.
+    """The stretches of these records and their bandwidth. Gaps that are short relative to the effort's shortest
+    period are bridged.
 
-    It is read off the stretches between all gaps first, and again off the longer ones that it leads to.
+    The bandwidth is first estimated from the stretches between all gaps, then again from the resulting longer ones.
     """
     raw = stretches(records, model)
     chosen = bandwidth_of(raw, model)

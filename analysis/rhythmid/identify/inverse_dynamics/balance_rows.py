@@ -1,4 +1,4 @@
-"""Rows of a balance of effort: which samples of a motion they are, and signals between samples."""
+"""Rows of an effort balance: selection of a motion's samples, and interpolation of signals between samples."""
 
 import math
 
@@ -9,12 +9,12 @@ from rhythmid.identify.noise import runs
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-NEIGHBOURS = np.arange(-2, 4)  # samples from which a value between two is interpolated (Lagrange)
+NEIGHBOURS = np.arange(-2, 4)  # offsets of the samples for interpolation between two samples (Lagrange)
 
 
 def stuck(slow: Mask, memory: float) -> Mask:
-    """Samples (n,) to leave out: all `slow` ones, and within half the filter's `memory` [samples] of a rest as long as that, for
-    what the friction did meanwhile has come there through the filter."""
+    """Samples (n,) to leave out: all `slow` ones, and those within half the filter's `memory` [samples] of a rest
+    of that length, because the filter spreads the friction force of the rest to them."""
     out, half = slow.copy(), math.ceil(0.5 * memory)
     for part in runs(slow):
         first, end = part.start, part.stop
@@ -24,7 +24,7 @@ def stuck(slow: Mask, memory: float) -> Mask:
 
 
 def sampled(signal: Array, places: NDArray[np.int64], shift: float) -> Array:
-    """Values of (n,) or (n, p) at places moved by `shift` samples."""
+    """Values of a signal (n,) or (n, p) at places moved by `shift` samples."""
     whole = math.floor(shift)
     if shift == whole:
         return signal[np.clip(places + whole, 0, len(signal) - 1)]

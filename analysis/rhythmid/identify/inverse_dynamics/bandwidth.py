@@ -1,4 +1,4 @@
-"""Up to which frequency the motion is measured, and up to which the effort is explained by any map of the motion at all."""
+"""Bandwidth of the measured motion, and bandwidth within which any map of the motion explains the effort."""
 
 import math
 from collections.abc import Sequence
@@ -14,21 +14,27 @@ from rhythmid.identify.position_lines import lines_below
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-ABOVE = 4.0  # times its floor that the spectrum of the motion is at least within the bandwidth (as the records' own `bandwidth`)
-HIGHEST_DERIVED_SHARE = 0.2  # of the sample rate: derivatives of a spline err by 3 % there
+# least ratio of the motion's spectrum to its noise floor within the bandwidth (as the records' own `bandwidth`)
+ABOVE = 4.0
+# share of the sample rate: there the derivatives of a spline have an error of 3 %
+HIGHEST_DERIVED_SHARE = 0.2
 HALF = 0.5  # share of the effort's power that a free map has to explain in the highest half-octave
-SEGMENTS = 8  # of a record in Welch's spectra, at least
-RIDGE = 1e-6  # of the columns' power, against columns that the data do not tell apart
-FLOORLESS = 1e-12  # of the strongest line, below which what looks like a floor is the window's leakage
-SLOW = 4.0  # times below its strongest frequency that a motion is integrated from an acceleration
-LOWEST = 4.0  # times the strongest frequency of the motion: less would round off what a friction does at each reversal
+SEGMENTS = 8  # least number of segments of a record in Welch's spectra
+RIDGE = 1e-6  # share of the columns' power, as regularisation against collinear columns
+FLOORLESS = 1e-12  # share of the strongest line below which an apparent floor is leakage of the window
+SLOW = 4.0  # ratio of the strongest frequency to the lowest one from which an acceleration is integrated
+# least cut-off as a multiple of the motion's strongest frequency: a lower one would smooth the friction force at
+# each reversal
+LOWEST = 4.0
 
 
 @dataclass(frozen=True)
 class Bandwidth:
-    """Cut-offs [Hz] of the motion's filter and of the parallel one on effort and columns; `explained` is the share of the
-    effort's power below `effort` that a free map explains, `dominant` [Hz] the motion's strongest frequency. Where an
-    acceleration was measured, nothing below `low` [Hz] is known."""
+    """Cut-offs [Hz] of the motion's filter and of the parallel filter on effort and columns.
+
+    `explained` is the share of the effort's power below `effort` [Hz] that a free map explains, `dominant` [Hz] the
+    motion's strongest frequency. Where an acceleration was measured, the motion is unknown below `low` [Hz].
+    """
 
     motion: float
     effort: float
@@ -38,7 +44,7 @@ class Bandwidth:
 
 
 def bandwidth_of_motion(raw: Sequence[Stretch]) -> tuple[float, float]:
-    """Highest frequency [Hz] at which the motion of these stretches is measured, and its strongest one."""
+    """Highest frequency [Hz] at which the motion of these stretches is measured, and its strongest frequency [Hz]."""
     limits, lines, weights = [], [], []
     for one in raw:
         limit, line = _of_motion(one)
@@ -52,14 +58,14 @@ def bandwidth_of_motion(raw: Sequence[Stretch]) -> tuple[float, float]:
 
 
 def bandwidth_of(raw: Sequence[Stretch], model: Model) -> Bandwidth:
-    """The bandwidth at which the effort of these stretches is explained."""
+    """The bandwidth within which the effort of these stretches is explained."""
     motion, dominant = bandwidth_of_motion(raw)
     low = dominant / SLOW if any(one.measured == "acceleration" for one in raw) else 0.0
     return bandwidth_below([motion_of(one, model, motion, low) for one in raw], motion, dominant, low)
 
 
 def bandwidth_below(motions: Sequence[Motion], motion: float, dominant: float, low: float = 0.0) -> Bandwidth:
-    """The bandwidth at which the effort of these motions is explained, which are known below `motion` [Hz]."""
+    """The bandwidth within which the effort of these motions, known below `motion` [Hz], is explained."""
     lines = _lines(motions, motion / 2.0, low)
     effort = _of_effort(motions, motion / 2.0, dominant, low, lines)
     effort = max(effort, min(LOWEST * dominant, motion / 2.0))
@@ -67,10 +73,10 @@ def bandwidth_below(motions: Sequence[Motion], motion: float, dominant: float, l
 
 
 def _of_motion(raw: Stretch) -> tuple[float, float]:
-    """Highest frequency [Hz] at which the motion stands above its floor, and its strongest one.
+    """Highest frequency [Hz] at which the motion exceeds its noise floor, and its strongest frequency [Hz].
 
-    The spectrum may fall to the floor between two lines. The band goes on behind such a gap where the velocity has more power there above
-    `ABOVE` times the floor than it lacks in the gap.
+    The spectrum may fall to the floor between two lines. The band includes such a gap where the velocity's power above `ABOVE` times the
+    floor, beyond the gap, is more than what it lacks within the gap.
     """
     length = max(min(len(raw.output), 64), len(raw.output) // SEGMENTS)
     rate = 1.0 / raw.period
@@ -87,7 +93,8 @@ def _of_motion(raw: Stretch) -> tuple[float, float]:
 
 
 def _lines(motions: Sequence[Motion], frequency: float, low: float) -> tuple[float, ...]:
-    """Wavelengths of what is left over position: a free map is too smooth for a ripple of many waves, which would be taken for noise."""
+    """Wavelengths of lines over position in the residuals: a free map is too smooth for a ripple with many periods,
+    which would be taken for noise."""
     _, left = _residuals(motions, frequency, low, ())
     kept = [_kept(motion, frequency) for motion in motions]
     position, velocity = (
@@ -98,7 +105,7 @@ def _lines(motions: Sequence[Motion], frequency: float, low: float) -> tuple[flo
 
 
 def _kept(motion: Motion, frequency: float) -> slice:
-    """Samples of a motion without the filter's start and end."""
+    """Samples of a motion without the filter's transients at both ends."""
     margin = min(math.ceil(1.0 / (frequency * motion.period)), len(motion.time) // 4)
     return slice(margin, len(motion.time) - margin)
 
@@ -106,14 +113,14 @@ def _kept(motion: Motion, frequency: float) -> slice:
 def _residuals(
     motions: Sequence[Motion], frequency: float, low: float, lines: Sequence[float]
 ) -> tuple[list[Array], list[Array]]:
-    """Efforts below the frequency, and what a free map with these lines over position leaves of them."""
+    """Efforts below the frequency, and their residuals after a free map with these lines over position."""
     free = FreeMap(list(motions))
 
     def below(values: Array, motion: Motion) -> Array:
         passed = low_pass(values, motion.period, frequency)
         return high_pass(passed, motion.period, low)[_kept(motion, frequency)]
 
-    # the columns of one motion at a time: those of many long records would be large
+    # one motion at a time: the columns of many long records would be large
     efforts: list[Array] = []
     products: list[Array] = []
     for motion in motions:
@@ -125,7 +132,7 @@ def _residuals(
     norms[norms == 0.0] = 1.0
     normal = product[1:, 1:] / np.outer(norms, norms) + RIDGE * np.eye(len(norms))
     coefficients = np.linalg.solve(normal, product[1:, 0] / norms) / norms
-    # filters are linear, so that the sum of the columns goes through them as one
+    # filters are linear, so one pass filters the sum of the columns
     return efforts, [
         effort - below(_columns(free, motion, lines) @ coefficients, motion)
         for effort, motion in zip(efforts, motions, strict=True)
@@ -133,7 +140,7 @@ def _residuals(
 
 
 def _columns(free: FreeMap, motion: Motion, lines: Sequence[float]) -> Array:
-    """Columns (n, q) of what may make up the effort of a motion: a free map, the motion itself and lines over position."""
+    """Regressors (n, q) for the effort of a motion: a free map, the motion itself and lines over position."""
     made = [free.columns(motion, np.zeros(len(motion.time))), motion.leg_position, motion.leg_velocity]
     if not motion.driven_by_base:
         made.append(motion.acceleration)

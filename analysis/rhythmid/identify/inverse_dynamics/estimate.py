@@ -1,8 +1,9 @@
-"""Inverse-dynamics identification: parameters from the balance of effort, by Gauss-Newton with Student's t errors and priors.
+"""Inverse-dynamics identification: parameters from the effort balance, by Gauss-Newton with Student's t errors and
+priors.
 
-M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 (the linear estimator); elements that are not linear in a parameter
-are linearised again at every step. One nuisance stands beside the parameters: the alignment of effort and motion in time, known
-to a sample.
+The linear estimator is that of M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362. Elements that are not
+linear in a parameter are linearised again at every step. One nuisance parameter is added: the alignment of effort
+and motion in time, which is known to a sample.
 """
 
 import math
@@ -19,22 +20,28 @@ from rhythmid.model import INERTIA, Model
 from rhythmid.value import Prior
 
 Array = NDArray[np.float64]
-SPREAD = 0.7  # relative standard deviation of a value that the file states without a prior: a factor of two either way (ln 2)
-FAINTEST = 0.1  # of the effort that one standard deviation of a prior may move at least: a file's placeholder forbids nothing
-ALIGNED = 1.0  # samples: standard deviation of the alignment of effort and motion, whose stamps a driver rounds to a sample
-FARTHEST = 2.0  # samples by which they may be out; a longer delay is a hypothesis of its own
-LEAST_INERTIA = 0.01  # of an inertia or a motor's constant that is thought of, at least: none vanishes
-SHRINKS = 3.0  # times by which one of these becomes smaller in a step, at most: what is divided by it is far from linear
-STEPS = 12  # Gauss-Newton steps at most
+# relative standard deviation of a value without a stated prior: a factor of two either way (ln 2)
+SPREAD = 0.7
+# least change of the effort, as a share of its size, that one standard deviation of a prior allows: a placeholder
+# in the file excludes nothing
+FAINTEST = 0.1
+# samples: standard deviation of the alignment of effort and motion, whose timestamps a driver rounds to a sample
+ALIGNED = 1.0
+FARTHEST = 2.0  # samples: largest misalignment; a longer delay is a separate hypothesis
+LEAST_INERTIA = 0.01  # least value of an inertia or motor constant, relative to its start: none vanishes
+# largest factor by which one of these becomes smaller in a step: quotients by it are strongly nonlinear
+SHRINKS = 3.0
+STEPS = 12  # most Gauss-Newton steps
 HALVINGS = 5
-SETTLED = 1e-4  # change of the cost below which it is at its end
-DIFFERENCE = 1e-4  # of a parameter's size: step of its finite difference
-FAR_SPREADS = 1e3  # spreads of the effort's size: a column that moves the effort by less for one unit has no size of its own
+SETTLED = 1e-4  # relative change of the cost below which the fit has converged
+DIFFERENCE = 1e-4  # step of the finite difference, relative to a parameter's size
+# prior standard deviation, relative to the value, of a parameter that does not change the effort
+FAR_SPREADS = 1e3
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """What is known of the alignment [s] before the data: normal about `mean`, at most `most` from 0."""
+    """Prior of the alignment [s]: normal about `mean`, at most `most` from 0."""
 
     std: float
     low: float
@@ -43,17 +50,18 @@ class Alignment:
 
     @classmethod
     def of(cls, balance: Balance) -> "Alignment":
-        """A sample wide, two at most."""
+        """One sample as standard deviation, two samples as limit."""
         return cls(ALIGNED * balance.period, -FARTHEST * balance.period, FARTHEST * balance.period)
 
 
 @dataclass(frozen=True, eq=False)
 class EffortFit:
-    """A model fitted to recorded efforts; n rows, p parameters: the alignment [s], then `names`.
+    """A model fitted to recorded efforts, with n rows and p parameters: the alignment [s], then `names`.
 
-    `residual` (n,) is predicted less measured, `jacobian` (n, p) its derivatives, `precision` (p,) and `departure` (p,) the
-    priors' inverse variances and how far the values are from their means. `std` (p,) follows from the weighted normal
-    equations, inflated by the residual's autocorrelation time [rows] `correlation`. `at_limit` (p,) marks what ends at a bound.
+    `residual` (n,) is predicted minus measured effort, `jacobian` (n, p) its derivatives. `precision` (p,) holds
+    the priors' inverse variances, `departure` (p,) the distances of the values from the prior means. `std` (p,)
+    follows from the weighted normal equations, inflated by the residual's autocorrelation time `correlation`
+    [rows]. `at_limit` (p,) marks parameters at a bound.
     """
 
     model: Model
@@ -76,21 +84,22 @@ class EffortFit:
 
 
 def size_of(balance: Balance) -> float:
-    """Size (rms) of the recorded effort at the rows; of a constant effort it is that constant."""
+    """Size (rms) of the recorded effort at the rows; of a constant effort its value."""
     return float(np.sqrt(np.mean(balance.measured**2))) or 1.0
 
 
 def variation_of(balance: Balance) -> float:
-    """What errors are a share of: the rms of the recorded effort about its mean, for a model explains no motion by the force that a machine
-    needs at rest; of a constant effort its size."""
+    """Reference for relative errors: the rms of the recorded effort about its mean, because a constant holding
+    force says nothing about a motion. For a constant effort it is the effort's size."""
     return float(np.std(balance.measured)) or size_of(balance)
 
 
 def priors_of(balance: Balance, model: Model, names: Sequence[str], columns: Array) -> dict[str, Prior]:
-    """What is known of parameters before the data; `columns` (n, p) are their effects for each unit.
+    """Priors of parameters; `columns` (n, p) are their effects per unit.
 
-    The file's prior where it states one. Else a value that has to be positive is right to a factor of two, and any other one
-    changes the effort by as much as the effort is: no friction is greater than what moves the machine.
+    The file's prior is used where it states one. Otherwise a positive parameter is known to a factor of two, and
+    any other parameter changes the effort by at most about the effort's own size: no friction exceeds the force
+    that moves the machine.
     """
     size, found = size_of(balance), {}
     parameters = model.parameters
@@ -139,10 +148,10 @@ def fit_effort(
     alignment: float = 0.0,
     steps: int = STEPS,
 ) -> EffortFit:
-    """Fit the named free parameters of a model (all that the effort can tell of) to the recorded efforts.
+    """Fit the named free parameters of a model (by default all that the effort depends on) to the recorded efforts.
 
-    `priors` state more than `priors_of` knows. Starts from the model's values and from `alignment` [s]. It ends with what it has where
-    a deadline passes.
+    `priors` add to `priors_of`. The fit starts from the model's values and from `alignment` [s]. If a deadline
+    passes, it returns the values reached so far.
     """
     names = tuple(balance.estimated(model) if names is None else names)
     aligned = aligned or Alignment.of(balance)
@@ -200,7 +209,7 @@ def fit_effort(
 
 
 def _divides(model: Model, name: str) -> bool:
-    """Whether a parameter is one that cannot be 0: the inertia, or a constant of the motor: what turns a signal into a force, and what limits that."""
+    """Whether a parameter cannot be 0: the inertia, or a motor constant (the gain from signal to force, or its limit)."""
     term = model.term(name.split(".")[0])
     return name == INERTIA or (term is not None and term.element.acts == "transducer")  # pyright: ignore[reportUnnecessaryComparison]
 
@@ -209,7 +218,7 @@ def _step(
     residual: Array, jacobian: Array, precision: Array, value: Array, mean: Array, low: Array, high: Array,
     scale: float,
 ) -> Array:  # fmt: skip
-    """Gauss-Newton step (p,); what would leave its bounds stays on them and the others are solved for again."""
+    """Gauss-Newton step (p,). A component that would leave its bounds is fixed there, and the others are solved again."""
     weight = weights_of(residual, scale) / scale**2
     normal = (jacobian * weight[:, None]).T @ jacobian + np.diag(precision)
     slope = jacobian.T @ (weight * residual) + precision * (value - mean)
@@ -232,9 +241,10 @@ def _step(
 
 
 def condition_of(fit: EffortFit) -> float:
-    """Condition number of the parameters' columns, each scaled to length 1, without the priors' help.
+    """Condition number of the parameters' columns, each scaled to length 1, without the priors.
 
-    A parameter that moves no row, such as the time of a jump within a sample, is mistaken for no other one and does not count.
+    A parameter without effect on any row, such as the time of a jump within a sample, is collinear with no other
+    and is left out.
     """
     columns = fit.jacobian[:, 1:]
     norms = np.linalg.norm(columns, axis=0)

@@ -1,7 +1,8 @@
-"""A free map: any force that is a smooth function of speed in either direction, of position, and of friction under load.
+"""A free map: a force that is a smooth function of the speed in either direction, of position, and of friction
+under load.
 
-It stands for physics without a name. Splines are local and end flat where the data end: unbounded ones diverge in blocks that
-reach further than those that they were fitted to.
+It represents effects for which the catalogue has no element. The splines are local and constant beyond the data:
+splines that extrapolate diverge in blocks whose data reach further than the fitted ones.
 """
 
 import numpy as np
@@ -11,10 +12,10 @@ from scipy.interpolate import BSpline
 from rhythmid.identify.inverse_dynamics.motion import Motion
 
 Array = NDArray[np.float64]
-PIECES = 6  # of a spline of the speed: enough for a Stribeck fall
-PLACES = 10  # of the spline of the position: enough for a hardening, a kink or a turn's sine
+PIECES = 6  # pieces of a spline over the speed: enough for a Stribeck minimum
+PLACES = 10  # pieces of a spline over the position: enough for a hardening, a kink or the sine of one turn
 DEGREE = 3
-REACH = (0.01, 0.99)  # quantiles of the data between which a spline has its pieces
+REACH = (0.01, 0.99)  # quantiles of the data that limit a spline's pieces
 
 
 class Spline:
@@ -25,7 +26,7 @@ class Spline:
     def __init__(self, values: Array, pieces: int) -> None:
         low, high = np.quantile(values, REACH)
         high = high if high > low else low + max(abs(low), 1.0) * 1e-9
-        # half of the way towards equal numbers of samples: quantiles alone leave the fast ends to one piece
+        # knots halfway between even spacing and quantiles: quantiles alone leave one piece for the high speeds
         even = np.linspace(low, high, pieces + 1)
         knots = 0.5 * (even + np.quantile(np.clip(values, low, high), np.linspace(0.0, 1.0, pieces + 1)))
         self.low, self.high = float(low), float(high)
@@ -35,11 +36,11 @@ class Spline:
 
     @property
     def count(self) -> int:
-        """Number of columns: the straight line's two, then those that bend."""
+        """Number of columns: two of the straight line, then the curved ones."""
         return 2 + self.shape.shape[1]
 
     def __call__(self, values: Array) -> Array:
-        """Columns (n, count): 1, the value from -1 to 1, and the bends."""
+        """Columns (n, count): 1, the value scaled to −1 … 1, and the curved columns."""
         inside = np.clip(values, self.low, self.high)
         straight = (2.0 * inside - self.low - self.high) / (self.high - self.low)
         bent = np.asarray(BSpline.design_matrix(inside, self.knots, DEGREE).toarray()) @ self.shape
@@ -47,11 +48,13 @@ class Spline:
 
 
 class FreeMap:
-    """Columns of a free map over the motions: a spline of the speed for each direction, one of the position, and
-    sgn(v) times the position, its square, and the load. `bends` (q,) marks those whose size is curvature.
+    """Columns of a free map over the motions: a spline of the speed for each direction, a spline of the position,
+    and sgn(v) times the position, its square, and the load. `bends` (q,) marks columns whose coefficients are
+    curvature.
 
-    A load counts as a share of `size`, that of the effort. With a joint `beside` this one there are splines of its speed, too, and of the sum and the difference of the two speeds: a belt or a
-    differential gear on the way to the motor makes that turn with both.
+    The load is a share of `size`, the size of the effort. A joint `beside` this one adds splines of its speed and
+    of the sum and the difference of the two speeds: a belt or a differential gear on the way to the motor turns
+    with both.
     """
 
     def __init__(self, motions: list[Motion], size: float = 1.0, beside: str | None = None) -> None:
@@ -62,7 +65,7 @@ class FreeMap:
         self._position = Spline(position, PLACES)
         self._centre, self._width = float(np.mean(position)), float(np.std(position)) or 1.0
         bends = [np.arange(spline.count) > 1 for sides in self._speeds for spline, _ in sides]
-        self._first = 1 if bends else 0  # the constant is there already, in two halves
+        self._first = 1 if bends else 0  # the constant is already the sum of two columns
         bends += [(np.arange(self._position.count) > 1)[self._first :], np.zeros(3, bool)]
         self.bends = np.concatenate(bends)
 
@@ -74,7 +77,7 @@ class FreeMap:
         return [own, other, own + other, own - other]
 
     def columns(self, motion: Motion, load: Array) -> Array:
-        """Columns (n, q) of one motion; `load` (n,) is the effort that a model predicts, never the measured one."""
+        """Columns (n, q) of one motion; `load` (n,) is the predicted effort, never the measured one."""
         sign = np.sign(motion.leg_velocity)
         found = [
             spline(direction * speed) * (direction * speed > 0.0)[:, None]
@@ -88,6 +91,6 @@ class FreeMap:
 
 
 def _two_sided(speed: Array) -> list[tuple[Spline, float]]:
-    """A spline of the speed (n,) for each direction in which there are samples enough."""
+    """A spline of the speed (n,) for each direction with enough samples."""
     sides = ((speed[speed > 0.0], 1.0), (-speed[speed < 0.0], -1.0))
     return [(Spline(one, PIECES), direction) for one, direction in sides if len(one) > 4 * PIECES]

@@ -1,9 +1,10 @@
-"""A free function of the motion and its past: physics without a name that no sum of curves over single quantities draws.
+"""A free function of the motion and its past, for effects that no sum of curves over single quantities can represent.
 
-What a joint gives back depends on several quantities at once, and play and hysteresis on where it last turned. The function is a
-Gaussian process of position, velocity, acceleration, load, and the states of stop operators of three widths, which remember the last
-turns (M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, Springer, 1996, ch. 2). It is reduced to a number of centres among the rows
-(C. K. I. Williams, M. Seeger, Using the Nyström method to speed up kernel machines, NIPS 13, 2000).
+The force at a joint depends on several quantities at once. With play and hysteresis it depends on the last turning
+points, too. The function is a Gaussian process of position, velocity, acceleration, load, and the states of stop
+operators of three widths, which remember the last turning points (M. Brokate, J. Sprekels, Hysteresis and Phase
+Transitions, Springer, 1996, ch. 2). It is reduced to a number of centres among the rows (C. K. I. Williams, M.
+Seeger, Using the Nyström method to speed up kernel machines, NIPS 13, 2000).
 """
 
 from collections.abc import Sequence
@@ -17,17 +18,20 @@ from scipy.spatial.distance import cdist
 from rhythmid.identify.inverse_dynamics.motion import Motion
 
 Array = NDArray[np.float64]
-# of the stops, in standard deviations of the position: presliding, play, a soft transmission
+# widths of the stops, in standard deviations of the position: presliding, play, a soft transmission
 WIDTHS = (0.02, 0.1, 0.4)
-CENTRES = 80  # a record has some hundred rows: about as many as its columns tell apart
-LENGTH = 2.0  # of the function, in standard deviations of each quantity: between 1.5 and 3, which were best for large and small remainders
-JITTER = 1e-6  # added to the kernel of the centres, so that near ones do no harm
-DISTINCT_STDS = 4.0  # standard deviations beyond which a quantity of other records is taken to be there
+CENTRES = 80  # a record has some hundred rows: about as many as its columns can distinguish
+# length scale of the function, in standard deviations of each quantity: 1.5 to 3 were best for large and small residuals
+LENGTH = 2.0
+# added to the diagonal of the kernel matrix of the centres, for conditioning when centres are close
+JITTER = 1e-6
+DISTINCT_STDS = 4.0  # standard deviations at which quantities of other records are clipped
 
 
 @njit("float64[::1](float64[::1], float64)", cache=True)
 def stop(position: Array, width: float) -> Array:
-    """State (n,) of a stop operator, from −1 to 1: it follows the position until it is `width` from where that last turned."""
+    """State (n,) of a stop operator, from −1 to 1: it follows the position up to a distance `width` from the last
+    turning point."""
     state = np.empty_like(position)
     state[0] = 0.0
     for k in range(1, len(position)):
@@ -37,8 +41,11 @@ def stop(position: Array, width: float) -> Array:
 
 
 class HistoryMap:
-    """Columns of the function over motions; `places` are the rows of each among which the centres are, `loads` (n,) the efforts that a
-    model predicts, never the measured ones. The size of every column is that of a bend of a free map."""
+    """Columns of the function over motions.
+
+    `places` are the rows of each motion from which the centres are chosen, `loads` (n,) the predicted efforts,
+    never the measured ones. Every column is scaled like a curved column of a free map.
+    """
 
     def __init__(
         self, motions: Sequence[Motion], places: Sequence[NDArray[np.int64]], loads: Sequence[Array]
@@ -67,6 +74,6 @@ class HistoryMap:
         return np.exp(-0.5 * cdist(scaled, self._centres, "sqeuclidean") / LENGTH**2)
 
     def columns(self, motion: Motion, load: Array) -> Array:
-        """Columns (n, q) of one motion; independent coefficients of one variance give the process."""
+        """Columns (n, q) of one motion; independent coefficients of equal variance give the process."""
         found = self._kernel(self._scaled(self._quantities(motion, load)))
         return solve_triangular(self._root, found.T, lower=True).T

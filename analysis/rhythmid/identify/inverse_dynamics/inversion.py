@@ -1,4 +1,4 @@
-"""Inversion along a trajectory: what must go in, at every instant, for a given signal to come out."""
+"""Inversion along a trajectory: the input, at every instant, that gives a wanted output."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -7,20 +7,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-MOST_INVERSION_STEPS = 12  # steps at most: an error that halves each time is then below a thousandth
-SETTLING = 0.5  # of its error that a correction has to leave at most: a limit of rate, which cannot be inverted, leaves nearly all
-FAST = 0.1  # of its error that a step leaves, up to which the slopes of the one before do for the next: they cost two runs
-EXACT = 1e-6  # of a signal: as near as an inversion goes
-LEAST_SHARE = 0.2  # of a step that is tried: a slope that grows fivefold on the way is still followed
-SECANT = 1e-3  # of a signal, over which a slope is taken
-FLAT = 0.05  # of its usual slope, below which an element counts as passing nothing on
-NO_SLOPE = 1e-9  # below which a slope is the rounding of what comes out, over a secant of `SECANT`
+MOST_INVERSION_STEPS = 12  # most iterations: an error that halves each time is then below a thousandth
+# largest share of the error that a correction may leave: a rate limit, which cannot be inverted, leaves nearly all of it
+SETTLING = 0.5
+# share of the error after a step below which the previous slopes are reused: new ones cost two evaluations
+FAST = 0.1
+EXACT = 1e-6  # relative accuracy of an inversion
+# smallest share of a step that is tried: enough for a slope that grows fivefold along the step
+LEAST_SHARE = 0.2
+SECANT = 1e-3  # step of the finite difference for a slope, relative to the signal
+FLAT = 0.05  # share of its usual slope below which an element counts as blocking its input
+NO_SLOPE = 1e-9  # slope below which it is rounding error of the output, with a step of `SECANT`
 
 
 @dataclass(frozen=True, eq=False)
 class Inverted:
-    """What goes in, `into` (n,), and the `error` (n,) of what then comes out. `slope` (n,) is that of what comes out over what goes in;
-    None where it was not asked for, or where what comes out does not depend on the same instant alone."""
+    """The input `into` (n,), and the `error` (n,) of its output. `slope` (n,) is the derivative of the output with
+    respect to the input; None where it was not requested, or where the output does not depend on the same instant
+    alone."""
 
     into: Array
     error: Array
@@ -30,16 +34,17 @@ class Inverted:
 def inverted(
     comes_out: Callable[[Array], Array], wanted: Array, remembers: bool, with_slope: bool = False
 ) -> Inverted:
-    """What goes in for `wanted` (n,) to come out.
+    """Input (n,) whose output is `wanted` (n,).
 
-    Newton's steps at each instant where what comes out depends on that instant alone; where it `remembers`, the change on the way is
-    taken off again as long as that settles. Where nothing is passed on, in a dead band or beyond a limit, it is what goes in to first order.
+    Where the output depends on the same instant alone, Newton steps are taken at each instant. Where the element
+    `remembers`, the error is subtracted from the input repeatedly as long as this converges. In a dead band or
+    beyond a limit, where the output does not respond, the result is the input to first order.
     """
     into, error = wanted, wanted - comes_out(wanted)
     first_order, least = wanted + error, EXACT * np.linalg.norm(wanted)
     slope: Array | None = None
-    share = np.ones(len(wanted))  # of a step, halved where it led too far: where the slope grows on the way
-    reached = np.ones(len(wanted), dtype=bool)  # by what goes in
+    share = np.ones(len(wanted))  # share of a step, halved where the step overshoots because the slope grows
+    reached = np.ones(len(wanted), dtype=bool)  # whether the wanted output is reachable
     for _ in range(MOST_INVERSION_STEPS):
         step = error
         if not remembers:
@@ -48,7 +53,7 @@ def inverted(
             step = share * np.divide(error, slope, out=np.zeros_like(error), where=reached)
         left = wanted - comes_out(into + step)
         if np.linalg.norm(left[reached]) > FAST * np.linalg.norm(error[reached]):
-            slope = None  # the last one leads too slowly
+            slope = None  # the last slope converges too slowly
         if remembers:
             nearer = np.full(len(wanted), np.linalg.norm(left) < SETTLING * np.linalg.norm(error))
         else:
@@ -65,8 +70,9 @@ def inverted(
 def followed(
     known: Inverted, comes_out: Callable[[Array], Array], wanted: Array, remembers: bool
 ) -> Inverted:
-    """What goes in for `wanted` (n,) to come out where both differ little from those of a `known` inversion: to first order, in one run
-    of what comes out. All over again where nothing is passed on somewhere, or where the slope is not known."""
+    """Input (n,) for `wanted` (n,) where both differ little from those of a `known` inversion: to first order, with
+    one evaluation of the output. A full inversion is made where the output does not respond somewhere, or where the
+    slope is unknown."""
     if known.slope is None or not known.slope.all():
         return inverted(comes_out, wanted, remembers)
     step = (wanted - comes_out(known.into) - known.error) / known.slope
@@ -75,8 +81,9 @@ def followed(
 
 @dataclass(frozen=True, eq=False)
 class Inversions:
-    """The inversions on the way from the forces of one motion to its effort: those `made`, by the element that was inverted ("" for the
-    forces that the effort loads), and those `known` of a model with nearly the same values, which are followed."""
+    """The inversions from the forces of one motion to its effort. `made` holds them by the label of the inverted
+    element ("" for the forces that depend on the effort as load); `known` holds those of a model with nearly the
+    same values, used as first-order starts."""
 
     known: Mapping[str, Inverted] = field(default_factory=dict)
     made: dict[str, Inverted] = field(default_factory=dict)
@@ -85,7 +92,7 @@ class Inversions:
     def inverted(
         self, label: str, comes_out: Callable[[Array], Array], wanted: Array, remembers: bool
     ) -> Array:
-        """What goes in (n,) for `wanted` (n,) to come out."""
+        """Input (n,) whose output is `wanted` (n,)."""
         if label in self.known:
             found = followed(self.known[label], comes_out, wanted, remembers)
         else:
@@ -95,7 +102,7 @@ class Inversions:
 
 
 def _slope(comes_out: Callable[[Array], Array], signal: Array) -> Array:
-    """Slope (n,) of what comes out over what goes in; 0 where hardly anything more comes out than usually does where something does."""
+    """Slope (n,) of output over input; 0 where the output responds far less than usual."""
     width = SECANT * (float(np.std(signal)) or 1.0)
     slope = (comes_out(signal + 0.5 * width) - comes_out(signal - 0.5 * width)) / width
     passing = np.abs(slope) > NO_SLOPE

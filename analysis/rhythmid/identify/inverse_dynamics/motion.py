@@ -1,9 +1,10 @@
-"""The measured motion as inverse dynamics needs it: position, velocity and acceleration, and the effort that made it.
+"""The measured motion for inverse dynamics: position, velocity, acceleration, and the effort that caused it.
 
-This is the one place where irregular stamps are put on a uniform grid (a cubic spline through the samples, `Record.uniform`):
-zero-phase filters need one. Low-pass in both directions, then the derivatives of cubic splines, which unlike central
-differences keep a motion of a tenth of the sample rate to a few thousandths.
-M. Gautier, A. Janot, P. O. Vandanjon, IEEE Trans. Control Syst. Technol. 21 (2013) 428 (IDIM-LS and its filters).
+Only here are irregular timestamps resampled to a uniform grid (a cubic spline through the samples,
+`Record.uniform`), because zero-phase filters need one. The signals pass a low-pass filter in both directions. Then
+cubic splines are differentiated. Unlike central differences, their derivatives are accurate to a few thousandths
+for motions up to a tenth of the sample rate. M. Gautier, A. Janot, P. O. Vandanjon, IEEE Trans. Control Syst.
+Technol. 21 (2013) 428 (IDIM-LS and its filters).
 """
 
 import math
@@ -27,27 +28,30 @@ from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-ORDER = 4  # of the Butterworth filter, run forwards and backwards (the order that Gautier et al. use)
-SLOW_ORDER = 2  # of the high-pass filter, run twice
-FINER = 10.0  # samples in a period of the motion's bandwidth that are kept: the switch of a friction is placed to a tenth of it
-FEWEST_STRETCH_SAMPLES = 32  # samples of a stretch without a gap, below which it says nothing
-BRIDGE = 3  # degree of the polynomial across a gap: it turns once on either side, as what the band holds may within three gaps
-LEAST_BESIDE = (
-    4  # samples on either side of a gap that it is fitted to, at least, and as many more as are missing
-)
+ORDER = 4  # order of the Butterworth filter, run forwards and backwards (as Gautier et al.)
+SLOW_ORDER = 2  # order of the high-pass filter, run in both directions
+# samples kept per period of the motion's bandwidth: a friction reversal is located to a tenth of the period
+FINER = 10.0
+FEWEST_STRETCH_SAMPLES = 32  # least number of samples of a stretch without gaps
+# degree of the polynomial across a gap: one turning point on either side, as many as the bandwidth allows within
+# three gaps
+BRIDGE = 3
+# least number of samples on either side of a gap for the polynomial; the number of missing samples is added
+LEAST_BESIDE = 4
 BASES = ("base_displacement", "base_acceleration")
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """One stretch of a record without a gap, on a uniform grid; arrays (n,) in the model's units.
+    """One stretch of a record without gaps, on a uniform grid; arrays (n,) in the model's units.
 
-    `record` numbers the record. `effort` is the total force that was recorded; of a machine that its base drives it is
-    d'Alembert's −m a, and `driven_by_base` says so. `leg_position`, `leg_velocity` are relative to the base where that
-    moves. `coupling` (n,) is, at a joint of several, the force beside its own inertia times its acceleration that the body asks
-    for; `links` are its derivatives with respect to the body's parameters, by name, and the values at which they were taken.
-    `bridged` are the gaps, from and until [s], across which nothing was recorded but interpolated: no row of effort lies there. `others`
-    are the speeds of the other joints, by name. Where the effort was not recorded, `reference` is what a controller makes it of.
+    `record` is the number of the record. `effort` is the recorded total force. For a machine that is driven by its
+    base it is d'Alembert's −m a, and `driven_by_base` is True. `leg_position`, `leg_velocity` are relative to a
+    moving base. `coupling` (n,) is used for a joint of several: the force that the body requires besides the
+    joint's own inertia times its acceleration. `links` holds its derivatives with respect to the body's parameters,
+    by name, with the values at which they were taken. `bridged` holds the gaps, from and until [s], that were
+    interpolated; they contain no rows of effort. `others` holds the speeds of the other joints, by name. Where the
+    effort was not recorded, `reference` is the reference from which a controller computes it.
     """
 
     record: int
@@ -68,7 +72,7 @@ class Motion:
     reference: Reference | None = None
 
     def recorded(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Those of the rows that lie in no gap."""
+        """Those of the `rows` that lie in no gap."""
         time = self.time[rows]
         for begin, end in self.bridged:
             rows, time = rows[(time <= begin) | (time >= end)], time[(time <= begin) | (time >= end)]
@@ -86,8 +90,8 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Raw samples (n,) of one stretch: the measured output, the effort or base signal, and the forcing, on a grid; `bridged` are
-    the gaps, from and until [s], across which they were interpolated."""
+    """Raw samples (n,) of one stretch on a uniform grid: the measured output, the effort or base signal, and the
+    forcing. `bridged` holds the interpolated gaps, from and until [s]."""
 
     record: int
     name: str
@@ -101,7 +105,7 @@ class Stretch:
 
 
 def effort_channel(record: Record, model: Model) -> Channel | None:
-    """The channel that holds the effort: what was recorded of the motor, else the commanded force; None where there is none."""
+    """The channel with the effort: the recorded motor effort, else the commanded force; None where there is neither."""
     if record.effort is not None:
         return record.effort
     if record.input is not None and record.input_kind == "force" and not controlled(model):
@@ -110,15 +114,15 @@ def effort_channel(record: Record, model: Model) -> Channel | None:
 
 
 def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> list[Stretch]:
-    """The stretches without gaps of all records, on uniform grids at the rates of their outputs; gaps of up to `longest` [s],
-    and those that their neighbours tell, are bridged.
+    """The stretches without gaps of all records, on uniform grids at their outputs' sample rates. Gaps of up to
+    `longest` [s] are bridged, and gaps that neighbouring samples determine.
 
     Raises InputError where a record has neither effort nor a moving base, or is too short.
     """
     found: list[Stretch] = []
     number, before = -1, ""
     for record in records:
-        number += not record.whole or record.whole != before  # stretches of one record have one number
+        number += not record.whole or record.whole != before  # stretches of one record share its number
         before = record.whole
         base = record.input is not None and record.input_kind in BASES
         effort = effort_channel(record, model)
@@ -139,7 +143,7 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
         short = short_gaps(grid.missing, int(longest / grid.period))
         bridged = short | (
             grid.missing & grid.valid
-        )  # where the neighbours tell a gap, the grid has its values
+        )  # where neighbouring samples determine a gap, the grid already has its values
         output, drive = (across(signal, ~grid.missing, short) for signal in (grid.output, drive))
         for joined in runs(~grid.missing | bridged):
             measured = joined.start + np.flatnonzero(~grid.missing[joined])
@@ -148,7 +152,7 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
             first, end = (
                 int(measured[0]),
                 int(measured[-1]) + 1,
-            )  # beyond the last sample there is nothing to bridge to
+            )  # beyond the last sample there is no other side of the gap
             if end - first < FEWEST_STRETCH_SAMPLES:
                 continue
             part = slice(first, end)
@@ -166,7 +170,7 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
 
 
 def short_gaps(missing: Mask, longest: int) -> Mask:
-    """Samples (n,) in gaps of at most so many samples, with at least four recorded ones near either side."""
+    """Samples (n,) in gaps of at most `longest` samples with at least four recorded samples near either side."""
     found = np.zeros(len(missing), dtype=bool)
     for gap in runs(missing):
         first, end = gap.start, gap.stop
@@ -178,8 +182,8 @@ def short_gaps(missing: Mask, longest: int) -> Mask:
 
 
 def across(signal: Array, recorded: Mask, bridged: Mask) -> Array:
-    """A signal (n,) with its `bridged` runs on the polynomial through what is recorded on either side, by least squares: a spline
-    through noisy samples would set out with the slope of their noise."""
+    """A signal (n,) whose `bridged` runs are replaced by a least-squares polynomial through recorded samples on
+    either side. A spline through noisy samples would start with the slope of their noise."""
     made = signal.copy()
     for gap in runs(bridged):
         first, end = gap.start, gap.stop
@@ -187,7 +191,7 @@ def across(signal: Array, recorded: Mask, bridged: Mask) -> Array:
         near = np.arange(max(first - beside, 0), min(end + beside, len(signal)))
         near = near[recorded[near]]
         if len(near) <= BRIDGE:
-            continue  # what the spline made of it
+            continue  # keep the spline's values
         through = Polynomial.fit(near.astype(float), signal[near], BRIDGE)
         made[first:end] = through(np.arange(first, end, dtype=float))
     return made
@@ -200,7 +204,7 @@ def _sections(order: int, cut: float, kind: str) -> Array:
 
 
 def low_pass(values: Array, period: float, frequency: float) -> Array:
-    """Values (n,) or (n, p) without what is above the frequency [Hz]: a Butterworth filter in both directions."""
+    """Values (n,) or (n, p) after a low-pass Butterworth filter of cut-off `frequency` [Hz], run in both directions."""
     if frequency * period >= 0.45:
         return values
     sections = _sections(ORDER, 2.0 * frequency * period, "lowpass")
@@ -209,7 +213,8 @@ def low_pass(values: Array, period: float, frequency: float) -> Array:
 
 
 def high_pass(values: Array, period: float, frequency: float) -> Array:
-    """Values (n,) or (n, p) without what is below the frequency [Hz], in both directions; all of them where it is 0."""
+    """Values (n,) or (n, p) after a high-pass filter of cut-off `frequency` [Hz], run in both directions; unchanged
+    where it is 0."""
     if frequency <= 0.0:
         return values
     sections = _sections(SLOW_ORDER, 2.0 * frequency * period, "highpass")
@@ -218,10 +223,10 @@ def high_pass(values: Array, period: float, frequency: float) -> Array:
 
 
 def motion_of(stretch: Stretch, model: Model, frequency: float, low: float = 0.0) -> Motion:
-    """The motion below `frequency` [Hz] of one stretch, on a grid as coarse as that allows.
+    """The motion of one stretch below `frequency` [Hz], on a grid as coarse as that allows.
 
-    What the model's sensor does to the measurement is taken back to first order. A velocity is integrated to a position whose
-    mean is zero, an acceleration to a motion above `low` [Hz]: an accelerometer's drift would be all that is seen below.
+    The effect of the model's sensor elements is removed to first order. A velocity is integrated to a position of mean
+    zero. An acceleration is integrated to a motion above `low` [Hz]: below, the accelerometer's drift would dominate.
     """
     time, period = stretch.time, stretch.period
     coarser = max(1, int(1.0 / (FINER * frequency * period)))
@@ -236,7 +241,7 @@ def motion_of(stretch: Stretch, model: Model, frequency: float, low: float = 0.0
         base_acceleration = drive
     relative = (
         stretch.kind == "base_acceleration"
-    )  # then the motion is the leg's, and the mass moves with the base besides
+    )  # the motion is then relative to the base, and the mass moves with the base as well
     if stretch.measured == "position":
         position, velocity, acceleration = _derivatives(time, smooth)
     elif stretch.measured == "velocity":
@@ -252,7 +257,7 @@ def motion_of(stretch: Stretch, model: Model, frequency: float, low: float = 0.0
     moved = stretch.kind == "base_displacement"
     if (
         moved and stretch.measured == "acceleration"
-    ):  # the base's slow motion, too, is unknown to the accelerometer
+    ):  # the accelerometer does not show the base's slow motion either
         base, base_rate = high_pass(base, period, low), high_pass(base_rate, period, low)
     return Motion(
         stretch.record, stretch.name, time, position, velocity, acceleration,
@@ -265,19 +270,19 @@ def motion_of(stretch: Stretch, model: Model, frequency: float, low: float = 0.0
 
 
 def _derivatives(time: Array, value: Array) -> tuple[Array, Array, Array]:
-    """A smooth signal (n,) with its first and second derivative."""
+    """A smooth signal (n,) with its first and second derivatives (n,)."""
     rate = CubicSpline(time, value).derivative()(time)
     return value, rate, CubicSpline(time, rate).derivative()(time)
 
 
 def _integral(time: Array, value: Array) -> Array:
-    """Integral (n,) of a signal whose mean is taken for an offset, with mean zero."""
+    """Integral (n,), of mean zero, of a signal whose mean is treated as an offset."""
     total = CubicSpline(time, value - value.mean()).antiderivative()(time)
     return total - total.mean()
 
 
 def _before_sensor(stretch: Stretch, model: Model) -> Array:
-    """The measured output with what the model's sensor elements add to it taken away, to first order."""
+    """The measured output (n,) without the effect of the model's sensor elements, to first order."""
     output = stretch.output
     for term in model.terms:
         if term.element.slot == "sensor" and term.element.kernel is not None:
@@ -289,10 +294,11 @@ def _before_sensor(stretch: Stretch, model: Model) -> Array:
 
 
 def _mean_held(channel: Channel, time: Array, period: float) -> Array:
-    """Mean (n,) of a held effort over a period about each time: what the machine answers to. The value at the time itself would be one
-    hold older or younger as the stamps happen to jitter about the grid."""
+    """Mean (n,) of a held effort over one period about each time, to which the machine responds. The value at the
+    time itself could be one hold too old or too new, depending on the jitter of the timestamps."""
     ends = np.array([min(channel.time[0], time[0]) - period, max(channel.time[-1], time[-1]) + period])
-    knots = np.concatenate([ends[:1], channel.time[1:], ends[1:]])  # before the first sample it was as there
+    # before the first sample the first value is used
+    knots = np.concatenate([ends[:1], channel.time[1:], ends[1:]])
     impulse = np.concatenate([[0.0], np.cumsum(channel.value * np.diff(knots))])
     first, last = (np.interp(time + side * period, knots, impulse) for side in (-0.5, 0.5))
     return (last - first) / period

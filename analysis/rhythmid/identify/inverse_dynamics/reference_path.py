@@ -1,9 +1,10 @@
-"""The force that a controller with known gains makes of its reference, along the motion that was measured.
+"""The force that a controller with known gains commands for its reference, along the measured motion.
 
-The reference passes what the command path does to it: delays, a hold, a lag, a limit of its rate; the controller then works on the motion.
-A reference that is held from sample to sample is on average half a sample old. A controller that works once in a step holds its
-force for that step: its reference is on average half a step younger than its stamp says, and the velocity that it takes is that of the step
-before, half a step old (the steps of a symplectic Euler method, as MuJoCo takes them).
+The reference first passes the command path: delays, a hold, a lag, a rate limit. Then the controller acts on the
+motion. A reference that is held between samples is on average half a sample old. A controller that runs once per
+step holds its force for that step. Therefore its reference is on average half a step younger than its timestamp
+says. The velocity it uses is that of the previous step and half a step old (steps of a symplectic Euler method, as
+in MuJoCo).
 """
 
 from collections.abc import Hashable
@@ -21,20 +22,21 @@ if TYPE_CHECKING:
     from rhythmid.identify.inverse_dynamics.motion import Motion
 
 Array = NDArray[np.float64]
-ON_TICK = 1e-9  # [s] within which a command that has arrived counts as there
-KEPT = 16  # references behind a path that are kept: those of the steps of one fit
+ON_TICK = 1e-9  # [s] tolerance within which a command counts as arrived
+KEPT = 16  # cached references behind a command path: those of the steps of one fit
 PROBED = (
     0.0,
     0.0137,
     0.3711,
     1.9173,
-)  # [s] stamps, in no ratio, at which a delay is looked at for whether it varies
+)  # [s] times with irrational ratios at which a delay is evaluated to see whether it varies
 
 
 @dataclass(frozen=True, eq=False)
 class Commanded:
-    """The reference of a joint over a whole record, before the command path: (m,) stamps [s] and values there. The path remembers, so it is passed from
-    the record's begin on, where the joint is at `start`."""
+    """The reference of a joint over a whole record, before the command path: timestamps [s] (m,) and values (m,).
+    The path has memory, so the reference is passed through it from the start of the record, where the joint is at
+    `start`."""
 
     time: Array
     value: Array
@@ -42,7 +44,7 @@ class Commanded:
     _passed: dict[Hashable, Array] = field(default_factory=dict, repr=False)
 
     def passed(self, model: Model) -> Array:
-        """The reference (m,) behind the command path, but for its constant delays; the last ones are kept."""
+        """The reference (m,) after the command path, without its constant delays; the last results are cached."""
         key = changed_by(model)
         if key not in self._passed:
             if len(self._passed) >= KEPT:
@@ -66,12 +68,12 @@ class Commanded:
         return signal
 
     def late(self, model: Model) -> float:
-        """The constant delays [s] of the command path."""
+        """Sum of the command path's constant delays [s]."""
         return sum((_constant(term) for term in model.terms), 0.0)
 
 
 def _constant(term: Term) -> float:
-    """The one time [s] by which a term delays all commands; 0 where it varies or does not."""
+    """The delay [s] of a term if it is the same for all commands; 0 where it varies or where the term has none."""
     element = term.element
     if element.slot != "command" or element.delay is None:
         return 0.0
@@ -85,12 +87,12 @@ class Reference:
 
     Attributes
     ----------
-    commanded : over the whole record, of which the motion is that `part`.
-    forward : (n,) force that is added behind the controller, at the samples of the motion; None where there is none.
-    age : by how much older [s] than its stamp a reference is on average when it acts, beside the delays of the path.
-    step : [s] for which the controller holds its force.
+    commanded : the reference over the whole record; the motion is its `part`.
+    forward : (n,) force that is added after the controller, at the samples of the motion; None where there is none.
+    age : mean age [s] of a reference when it acts, relative to its timestamp, without the delays of the path.
+    step : [s] time for which the controller holds its force.
     cut : [Hz] bandwidth of the motion, above which nothing is compared.
-    every : samples of the record for one of the motion.
+    every : samples of the record per sample of the motion.
     """
 
     commanded: Commanded
@@ -102,7 +104,8 @@ class Reference:
     every: int
 
     def force(self, model: Model, motion: "Motion", late: float = 0.0) -> Array:
-        """Force (n,) that the controller of a model asks for along a motion, its reference `late` [s] beyond the model's delays."""
+        """Force (n,) that a model's controller commands along a motion, with its reference `late` [s] later than
+        the model's delays."""
         from rhythmid.identify.inverse_dynamics.motion import low_pass
 
         command = [term for term in model.terms if term.element.slot == "command"]
@@ -122,7 +125,7 @@ class Reference:
 
 
 def changed_by(model: Model) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    """The command path's terms with their values: what a controller's force depends on beside the motion."""
+    """The command path's terms with their values: all that a controller's force depends on besides the motion."""
     return tuple(
         (term.label, tuple(value.value for value in term.values.values()))
         for term in model.terms
@@ -131,7 +134,8 @@ def changed_by(model: Model) -> tuple[tuple[str, tuple[float, ...]], ...]:
 
 
 def _held(time: Array, signal: Array, delays: Array) -> Array:
-    """A signal (m,) whose samples act at their stamps and these delays (m,) [s], and last until the next one acts."""
+    """A signal (m,) whose samples act at their timestamps plus these delays (m,) [s], and are held until the next
+    one acts."""
     acting = np.maximum.accumulate(time + delays)
     last = np.searchsorted(acting, time + ON_TICK, side="right") - 1
     return signal[np.maximum(last, 0)]

@@ -1,10 +1,12 @@
-"""What is told of rests: there friction takes any value up to the breakaway force, and no law of the motion tells which effort that balances."""
+"""Message about samples at rest: there friction takes any value up to the breakaway force, so no law of the motion
+predicts the effort."""
 
-TOLD = 0.1  # of the samples, from which it is told that they are left out: a tenth widens intervals by 1/sqrt(0.9), a twentieth
+# least share of samples at rest for a message: leaving out a tenth widens intervals by 1/sqrt(0.9), a twentieth
+TOLD = 0.1
 
 
 def told(share: float) -> str | None:
-    """That the machine rests at a share of the samples, or close to them, where this is of practical size."""
+    """Message that the machine is at rest, or close to it, in a share of the samples; None where this share is small."""
     if share < TOLD:
         return None
     return f"{share:.0%} of the samples are in or beside rests, at which friction balances any effort: they are left out"

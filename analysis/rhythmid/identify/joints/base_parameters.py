@@ -1,10 +1,11 @@
 """Inertial parameters of all links from the efforts of all joints.
 
-Inverse dynamics is linear in the ten parameters of each link, but no motion shows all of them: what it shows are as many combinations,
-the base parameters, as the columns have rank (M. Gautier, IFAC Proc. 23 (1990) 455: QR with pivoting). Link parameters that a body can
-have are found as the nearest to the file's that fit as well: the pseudo-inertia of each link is a Cholesky product, so that it stays
-positive definite (C. Rucker, P. M. Wensing, IEEE Robot. Autom. Lett. 7 (2022) 2716; P. M. Wensing, S. Kim, J.-J. E. Slotine, IEEE
-Robot. Autom. Lett. 3 (2018) 60).
+Inverse dynamics is linear in the ten parameters of each link, but no motion identifies all of them. Only as many
+combinations are identifiable, the base parameters, as the regressor has rank (M. Gautier, IFAC Proc. 23 (1990) 455:
+QR with pivoting). Physically consistent link parameters are found as those nearest to the file's values with the
+same fit. The pseudo-inertia of each link is a Cholesky product and therefore stays positive definite (C. Rucker, P.
+M. Wensing, IEEE Robot. Autom. Lett. 7 (2022) 2716; P. M. Wensing, S. Kim, J.-J. E. Slotine, IEEE Robot. Autom.
+Lett. 3 (2018) 60).
 """
 
 from collections.abc import Mapping
@@ -22,16 +23,19 @@ from rhythmid.identify.joints.joint_motion import JointBalances
 Array = NDArray[np.float64]
 NAMES = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 UNITS = ("kg", *("kg*m",) * 3, *("kg*m^2",) * 6)
-SEEN = 1e-6  # of the largest singular value of the columns, each in units of its size, below which a combination is not seen
-TOLD = 0.05  # coefficient of a combination, below which the further parameter is not told
-SPREAD = 0.5  # standard deviation of the logarithm of a link's sizes about those of the file: a factor of 1.6 either way
-PASSES = 12  # of Gauss-Newton
-SAME = 1e-9  # of the cost: change at which the passes end
+# share of the scaled regressor's largest singular value below which a combination is not identifiable
+SEEN = 1e-6
+TOLD = 0.05  # coefficient of a combination below which a parameter is not listed
+# standard deviation of the logarithm of a link's sizes relative to the file's: a factor of 1.6 either way
+SPREAD = 0.5
+PASSES = 12  # Gauss-Newton iterations
+SAME = 1e-9  # relative change of the cost at which the iterations end
 
 
 @dataclass(frozen=True)
 class BaseParameter:
-    """A combination of inertial parameters that the records determine: `name`'s own and what goes with it, by name with its factor."""
+    """An identifiable combination of inertial parameters: that of `name`, and the further ones by name with their
+    factors."""
 
     name: str
     value: float
@@ -42,8 +46,8 @@ class BaseParameter:
 
 @dataclass(frozen=True)
 class InertialEstimate:
-    """Base parameters, and of each link ten parameters that a body can have; `rank` of `count` are seen, `condition` is that of the
-    scaled columns of those."""
+    """Base parameters, and for each link ten physically consistent parameters. `rank` of `count` combinations are
+    identifiable; `condition` is the condition number of their scaled columns."""
 
     base: tuple[BaseParameter, ...]
     links: Mapping[str, Mapping[str, float]]
@@ -55,7 +59,8 @@ class InertialEstimate:
 def estimate_inertia(
     balances: JointBalances, fits: Mapping[str, tuple[Balance, EffortFit]]
 ) -> InertialEstimate:
-    """Inertial parameters beside the path of each joint, fitted as in `fits`, whose free parameters are refitted with them."""
+    """Inertial parameters together with the path of each joint. The paths were fitted as in `fits`; their free
+    parameters are refitted."""
     body = balances.machine.body
     links = list(body.links)
     given = np.concatenate([body.inertial(link) for link in links])
@@ -88,12 +93,12 @@ def estimate_inertia(
 
 
 def _paths(fit: EffortFit) -> tuple[str, ...]:
-    """The fitted parameters of the joint's path, without the body's."""
+    """The fitted parameters of the joint's path, without those of the body."""
     return tuple(name for name in fit.names if not name.startswith("body."))
 
 
 def _without(values: Array, nuisance: Array) -> Array:
-    """What a least-squares fit of the nuisance columns leaves of values (n, p)."""
+    """Residual of values (n, p) after a least-squares fit of the nuisance columns."""
     norms = np.linalg.norm(nuisance, axis=0)
     left, singular, _ = np.linalg.svd(nuisance[:, norms > 0.0] / norms[norms > 0.0], full_matrices=False)
     basis = left[:, singular > 1e-9 * singular[0]]
@@ -101,7 +106,7 @@ def _without(values: Array, nuisance: Array) -> Array:
 
 
 def _sizes(inertial: Array) -> Array:
-    """Sizes of a link's parameters: its mass, and that times its radius of gyration and its square."""
+    """Scales of a link's parameters: its mass, and the mass times its radius of gyration and times the square of that."""
     mass = inertial[0]
     radius = np.sqrt(max(float(inertial[4:7].sum()) / (2.0 * mass), 1e-12))
     return mass * np.array([1.0, *(radius,) * 3, *(radius**2,) * 6])
@@ -138,7 +143,8 @@ def _base(
 
 
 def _consistent(matrix: Array, target: Array, given: Array, sizes: Array, count: int) -> Array:
-    """Parameters (10 links,) of bodies that can be, near those given: least squares with a prior on the logarithms of their sizes."""
+    """Physically consistent parameters (10 links,) near those given: least squares with a prior on the logarithms
+    of their sizes."""
     start = np.concatenate([to_cholesky(given[10 * k : 10 * k + 10]) for k in range(count)])
     scale = np.concatenate([_spread(start[10 * k : 10 * k + 10]) for k in range(count)])
     value = start.copy()
@@ -175,7 +181,8 @@ def _consistent(matrix: Array, target: Array, given: Array, sizes: Array, count:
 
 
 def _spread(cholesky: Array) -> Array:
-    """Standard deviations of the factors' entries: of their logarithms on the diagonal, elsewhere shares of the diagonal."""
+    """Standard deviations of the factors' entries: of the logarithms on the diagonal; below it, shares of the
+    diagonal."""
     size = np.exp(cholesky[:4])
     rows = np.array([1, 2, 2, 3, 3, 3])
     return np.concatenate([np.full(4, SPREAD), SPREAD * size[rows]])
@@ -184,7 +191,7 @@ def _spread(cholesky: Array) -> Array:
 def to_cholesky(inertial: Array) -> Array:
     """Logarithms of the diagonal (4) and the entries below it (6) of the factor of a link's pseudo-inertia.
 
-    Raises numpy.linalg.LinAlgError for parameters that no body can have.
+    Raises numpy.linalg.LinAlgError for parameters that are not physically consistent.
     """
     mass, centre = inertial[0], inertial[1:4]
     ixx, iyy, izz, ixy, ixz, iyz = inertial[4:]
@@ -193,7 +200,7 @@ def to_cholesky(inertial: Array) -> Array:
     whole = np.block([[np.array([[mass]]), centre[None, :]], [centre[:, None], second]])
     tiny = (
         1e-9 * np.trace(second) * np.diag([0.0, 1.0, 1.0, 1.0])
-    )  # a point or a rod has no second moments across
+    )  # a point or a rod has no second moments in some directions
     factor = np.linalg.cholesky(whole + tiny)
     return np.concatenate([np.log(np.diag(factor)), factor[np.tril_indices(4, -1)]])
 

@@ -1,4 +1,4 @@
-"""Correlations of the estimates of a machine of several joints."""
+"""Correlations of the estimates of a machine with several joints."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,17 +12,15 @@ from rhythmid.identify.inverse_dynamics.estimate import EffortFit
 from rhythmid.model import INERTIA
 
 Array = NDArray[np.float64]
-INSEPARABLE_CORRELATION = (
-    0.9  # correlation of two estimates, from which the records tell only a combination of them
-)
+INSEPARABLE_CORRELATION = 0.9  # correlation above which only a combination of two estimates is identifiable
 
 
 @dataclass(frozen=True, eq=False)
 class Correlations:
     """The `matrix` (n, n) of the correlations of the estimates `names`.
 
-    Estimates of inverse dynamics at different joints are taken as independent, and so are one that free runs have refined and one that they
-    have not.
+    Two pairs are taken as independent: estimates by inverse dynamics at different joints, and an estimate refined
+    by free runs with one that was not.
     """
 
     names: tuple[str, ...]
@@ -30,7 +28,7 @@ class Correlations:
 
     @classmethod
     def of_fit(cls, joint: str, fit: EffortFit) -> "Correlations":
-        """Those of a joint's fit, with the alignment of effort and motion."""
+        """Correlations of a joint's fit, including the alignment of effort and motion."""
         weight = fit.jacobian / fit.scale
         normal = weight.T @ weight + np.diag(fit.precision)
         scaling = 1.0 / np.sqrt(np.diag(normal))
@@ -40,13 +38,13 @@ class Correlations:
 
     @classmethod
     def of_covariance(cls, names: Sequence[str], covariance: Array) -> "Correlations":
-        """Those of a covariance, in whatever units."""
+        """Correlations of a covariance, in any units."""
         spread = np.sqrt(np.diag(covariance))
         return cls(tuple(names), covariance / np.outer(spread, spread))
 
     @classmethod
     def joined(cls, parts: Sequence["Correlations"]) -> "Correlations":
-        """Those of several fits, in which what a later part says of two names holds."""
+        """Correlations of several fits; for a pair of names in several parts the last one holds."""
         names = tuple(dict.fromkeys(name for part in parts for name in part.names))
         matrix = np.eye(len(names))
         for part in parts:
@@ -57,7 +55,7 @@ class Correlations:
         return cls(names, matrix)
 
     def close(self) -> Iterator[tuple[str, str, float]]:
-        """The pairs of names of which the records tell only a combination, and their correlation."""
+        """Pairs of names of which only a combination is identifiable, with their correlation."""
         for i, first in enumerate(self.names):
             for j in range(i):
                 if abs(self.matrix[i, j]) > INSEPARABLE_CORRELATION:
@@ -69,7 +67,7 @@ class Correlations:
 
 
 def label_of(joint: str, name: str) -> str:
-    """What the machine calls a parameter of a joint's balance."""
+    """The machine's name of a parameter of a joint's balance."""
     if name == INERTIA:
         return f"{BODY}.{joint}.armature"
     return name if name.startswith(f"{BODY}.") else f"{joint}.{name}"

@@ -1,11 +1,12 @@
-"""Efforts that were recorded in step with references that are held: what is made of them.
+"""Efforts that are recorded in step with held references: instantaneous values or means over the period.
 
-Such samples do not tell whether an effort is that of the instant or the mean over the period: the readings differ by damping and inertia at
-every joint in proportion to its controller's gains. So signals.yaml may say which it is. Where it does not, a diagnosis takes one lead for
-all joints that makes the efforts of most joints fit the model better, which an effect that a few joints lack does not do to the others; at
-these few the lead may do harm. An effect that many joints feel, such as a link's mass, hides the lead or exaggerates it. So where a reading
-leaves several causes, the other readings are searched as well, for one that needs fewer. An identification, to which inertia and damping are
-unknown, cannot tell.
+The samples alone do not tell which of the two they are. The two readings differ by damping and inertia at every
+joint, in proportion to its controller's gains. So signals.yaml may declare it. Otherwise a diagnosis chooses one
+lead for all joints if with it the efforts of most joints fit the model better. A missing effect at a few joints
+does not improve the other joints; at these few joints the lead may make the fit worse. An effect at many joints,
+such as a link's mass, can hide the lead or exaggerate it. So where a reading leaves several causes, the other
+readings are searched as well, for one that needs fewer causes. An identification cannot tell, because inertia and
+damping are unknown there.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,20 +22,20 @@ from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
 
 Array = NDArray[np.float64]
-LEADS = 121  # that are compared
-FURTHEST = 1.2  # times half a period, ahead or behind, up to which: at an end it stands for something else
+LEADS = 121  # number of leads that are compared
+FURTHEST = 1.2  # largest lead either way, in half periods: an optimum at the end represents another effect
 SCATTERED = (
     2.0 / 3.0,
     1.0,
-)  # of the lead of efforts at the very instants, that they have on average whose stamps scatter
+)  # share of the lead of instantaneous efforts that remains on average when timestamps scatter
 LESS = np.log(
     0.95
-)  # logarithm of the share to which the error of the middle one of all joints has to fall for a lead to be believed in
-NO_WORSE = 1e-9  # of a joint's error, by which rounding may raise it
+)  # logarithm of the ratio to which the median error of all joints has to fall before a lead is accepted
+NO_WORSE = 1e-9  # relative increase of a joint's error that rounding may cause
 
 
 def balances_of(machine: Machine, records: Sequence[JointRecord]) -> JointBalances:
-    """The balances of records, with the lead of references taken away where signals.yaml says that efforts are those of an instant.
+    """The balances of records, without the lead of references where signals.yaml declares efforts as instantaneous.
 
     Raises InputError where the records hold too little."""
     plain = JointBalances.of(machine, records)
@@ -42,15 +43,16 @@ def balances_of(machine: Machine, records: Sequence[JointRecord]) -> JointBalanc
 
 
 def _of_instants(balances: JointBalances) -> dict[str, float]:
-    """The lead [s] of each joint whose effort was recorded at the instants at which its reference jumps."""
-    step = balances.machine.body.step  # for which the machine's controllers hold what they ask for
+    """Lead [s] of each joint whose effort was recorded at the instants at which its reference changes."""
+    step = balances.machine.body.step  # time for which the machine's controllers hold their commands
     return {joint: 0.5 * max(period - step, 0.0) for joint, period in _periods(balances).items()}
 
 
 @threadpool_limits.wrap(limits=1)
 def likely_readings(balances: JointBalances, records: Sequence[JointRecord]) -> list[JointBalances]:
-    """The balances as they may have to be read where nothing is said of how efforts were sampled, the likeliest first: with the lead taken
-    away from all joints that most joints fit better with, else as they are; and with those that efforts of instants have."""
+    """Possible readings of the balances where the sampling of efforts is not declared, the likeliest first: without
+    the lead with which most joints fit better, else unchanged; and without the lead that instantaneous efforts
+    have."""
     periods = _periods(balances)
     if records[0].sampled is not None or not periods:
         return [balances]
@@ -73,11 +75,11 @@ def likely_readings(balances: JointBalances, records: Sequence[JointRecord]) -> 
 
 
 def lead_of_most(tried: Array, change: Array) -> float | None:
-    """The lead of those `tried` (l,) that most joints fit better with, None where there is none.
+    """The lead among `tried` (l,) with which most joints fit better; None where there is none.
 
     Parameters
     ----------
-    change : (joints, l) logarithm of each joint's error over that without a lead.
+    change : (joints, l) logarithm of the ratio of each joint's error to that without a lead.
     """
     middle = np.median(change, axis=0)
     best = int(np.argmin(middle))
@@ -88,7 +90,7 @@ def lead_of_most(tried: Array, change: Array) -> float | None:
 
 
 def not_told(balances: JointBalances, records: Sequence[JointRecord]) -> Iterator[str]:
-    """What an identification cannot tell where signals.yaml does not say how efforts were sampled."""
+    """What an identification cannot determine where signals.yaml does not declare how efforts were sampled."""
     periods = _periods(balances)
     if records[0].sampled is not None or not periods:
         return
@@ -109,7 +111,7 @@ def _periods(balances: JointBalances) -> dict[str, float]:
 
 
 def _errors(balances: JointBalances, joint: str, half: float, tried: np.ndarray) -> np.ndarray:
-    """What a joint's nominal path, fitted, misses of its effort with each lead; to first order in the lead and the parameters."""
+    """Effort error of a joint's fitted nominal path for each lead, to first order in the lead and the parameters."""
     balance, model = balances.balance(joint), balances.models[joint]
     residual, columns = linearise(balance, model, balance.estimated(model), 0.0)
     moved = balances.with_leads({joint: half}).balance(joint)

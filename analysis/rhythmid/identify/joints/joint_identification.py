@@ -1,9 +1,10 @@
-"""Identify a machine of several joints: each joint's path, the links' inertias, and what the records cannot tell apart.
+"""Identify a machine with several joints: each joint's path, the links' inertias, and what is not identifiable.
 
-Where a joint's effort was recorded, or follows from its controller's known gains and the reference, its path is fitted by inverse dynamics
-beside what the body asks of the joint; the links' inertial parameters follow from the efforts of all joints. Where a reference is known
-the machine also runs free over the stretches of the records, and the paths' parameters are refined until it moves as was measured, the
-inverse dynamics being what is known before.
+A joint's path is fitted by inverse dynamics together with the force that the body requires at the joint. This needs
+a recorded effort, or one that follows from the reference and the controller's known gains. The links' inertial
+parameters follow from the efforts of all joints. Where a reference is known, the machine is also simulated in free
+run over the stretches of the records. The paths' parameters are then refined to fit the measured motion, with the
+result of inverse dynamics as prior.
 """
 
 import math
@@ -43,15 +44,14 @@ from rhythmid.statistics import NORMAL_95
 if TYPE_CHECKING:
     from rich.console import Console
 
-WORSE = (
-    1.1  # times the error of free runs with the given values, from which the identified ones are warned of
-)
-MUCH = 0.005  # of the motion, by which it has to grow as well: a right model's free runs scatter by more
-LOOSE = 5.0  # times its standard deviation by inverse dynamics that a parameter may move in free runs: errors of the filter are in it
-RELATIVE = 0.3  # of its value, the same at least
-EXPECTED = (
-    0.02  # of the motion, that a right model's free run errs by (measured: machines in the air 1 to 3 %)
-)
+WORSE = 1.1  # ratio of free-run errors, identified over given values, above which a warning is given
+# share of the motion by which the error also has to grow: free runs of a correct model scatter by more
+MUCH = 0.005
+# standard deviations by inverse dynamics that a parameter may move in free runs: it also contains errors of the filter
+LOOSE = 5.0
+RELATIVE = 0.3  # share of its value by which a parameter may move at least
+# free-run error of a correct model as a share of the motion (measured: machines in the air 1 to 3 %)
+EXPECTED = 0.02
 
 
 @dataclass(frozen=True)
@@ -74,12 +74,14 @@ class JointEstimate:
 
 @dataclass(frozen=True)
 class MachineIdentification(Result):
-    """What was found.
+    """Result of the identification of a machine with several joints.
 
-    `parameters` by "joint.element.parameter" and "body.joint.armature"; `effort_nrmse` of each joint's predicted effort, `free_run`
-    of its motion as given and as identified, on records or ends of records that no fit has seen where `unseen`; `worse` the joints whose
-    motion the identified values predict worse than those given, `not_identified` those of which they predict neither motion nor effort;
-    `not_separable` in words. `fits` are of each joint the balance of its effort, its path as given, and the fit.
+    `parameters` are named "joint.element.parameter" and "body.joint.armature". `effort_nrmse` is the error of each
+    joint's predicted effort. `free_run` is the error of its motion with the given and the identified values; where
+    `unseen`, on records or ends of records that are held out. `worse` are the joints whose motion the identified
+    values predict worse than the given ones. `not_identified` are the joints of which they predict neither motion
+    nor effort. `not_separable` lists parameters that are not identifiable separately, in words. `fits` holds for
+    each joint its effort balance, its given path, and the fit.
     """
 
     machine: Machine
@@ -98,7 +100,7 @@ class MachineIdentification(Result):
 
     @property
     def usable(self) -> bool:
-        """Whether the fit explains enough of every joint to be called an identification."""
+        """Whether the fit explains enough of every joint to count as an identification."""
         return not self.not_identified
 
     @property
@@ -115,7 +117,7 @@ class MachineIdentification(Result):
         show_identification(self, console)
 
     def tables(self) -> Mapping[str, Sequence[Row]]:
-        """The `parameters`, and of each joint the `errors`."""
+        """The `parameters`, and the `errors` of each joint."""
         rows = [
             {"name": name, "value": one.value, "std": one.std, "unit": one.unit}
             for name, one in self.parameters.items()
@@ -158,8 +160,9 @@ def identify_machine(
 ) -> MachineIdentification:
     """Identify the free parameters of a machine, the armature of every joint, and its links' inertias.
 
-    With `free`, and where references are known, free runs refine the paths. Without `holdout` the last fifth of each record is held
-    out of them. Raises InputError for records that hold too little, lack a joint, or have them in another order.
+    Where references are known, `free` adds a refinement of the paths by free runs. Without `holdout` the last fifth
+    of each record is held out from it. Raises InputError for records that are too short, lack a joint, or have
+    joints in another order.
     """
     if not records:
         raise InputError("no record is given; name at least one bag or table")
@@ -232,10 +235,11 @@ def worse_joints(runs: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
 
 
 def poor_joints(efforts: Mapping[str, float], motions: Mapping[str, float] | None) -> tuple[str, ...]:
-    """The joints of which more than `POOR_MOTION` is missed: of the effort, and of the motion in free run where there is one.
+    """The joints with more than `POOR_MOTION` unexplained: of the effort, and of the free-run motion where there is one.
 
-    Either is enough to have been identified: without a controller the right machine drifts from the recorded motion as well, for small
-    errors of its effort add up, and where a reference makes the joint run its effort may be known by a guessed scale only.
+    One of the two is enough for an identification. Without a controller even the correct machine drifts from the
+    recorded motion, because small errors of its effort add up. Where a reference drives the joint, its effort may
+    be known only up to a guessed scale.
     """
     return tuple(
         joint
@@ -253,7 +257,7 @@ def _warning(joint: str, runs: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def _split(records: Sequence[JointRecord]) -> tuple[list[JointRecord], list[JointRecord]]:
-    """The first four fifths of every record, and its end."""
+    """The first four fifths of every record, and the rest."""
     cuts = [(record, record.span[0] + 0.8 * (record.span[1] - record.span[0])) for record in records]
     return (
         [record.cut(record.span[0], at) for record, at in cuts],
@@ -262,7 +266,7 @@ def _split(records: Sequence[JointRecord]) -> tuple[list[JointRecord], list[Join
 
 
 def rotor_freed(model: Model, armature: float) -> Model:
-    """The path with the rotor's inertia free, but not negative: what the body says of it is a guess."""
+    """The path with the rotor's inertia free but not negative: the body's value for it is a guess."""
     least = max(model.mass.value - armature, 0.0)
     return replace(model, mass=replace(model.mass, fixed=False, bounds=(least, math.inf)))
 
@@ -271,7 +275,7 @@ def _with_fit(
     machine: Machine, given: Machine, joint: str, fit: EffortFit, late: float | None,
     found: dict[str, JointEstimate],
 ) -> Machine:  # fmt: skip
-    """The machine with one joint's fit in it, which is added to what was found."""
+    """The machine with one joint's fit; the fit's estimates are added to `found`."""
     parameters = fit.model.parameters
     for place, name in enumerate(fit.names, start=1):
         std, value = float(fit.std[place]), parameters[name]
@@ -295,9 +299,11 @@ def _with_fit(
 
 
 def _aligned(balance: Balance, joint: str, common: ReferenceDelay | None) -> Alignment | None:
-    """What is known of the delay of a joint's reference about the shared one; None where its effort was recorded.
+    """Prior of the delay of a joint's reference, relative to the shared delay; None where its effort was recorded.
 
-    As well as the shared one is where the joints agree; else a sample wide, as stamps are, or as wide as that joint's own says.
+    Its standard deviation is that of the shared delay where all joints agree. If only some agree, it is one sample
+    for these, as for timestamps. For a joint with another delay, the prior is about its own delay and at least one
+    sample wide.
     """
     if common is None or joint not in common.joints:
         return None
@@ -311,7 +317,8 @@ def _aligned(balance: Balance, joint: str, common: ReferenceDelay | None) -> Ali
 
 
 def _known(machine: Machine, found: dict[str, JointEstimate]) -> dict[str, Knowledge]:
-    """What inverse dynamics says of the parameters that free runs refine: all but the rotors' inertias, which it tells better."""
+    """Priors from inverse dynamics for the parameters that free runs refine: all but the rotors' inertias, which it
+    determines better."""
     known = {}
     for name, one in found.items():
         if name.startswith(f"{BODY}."):
@@ -323,7 +330,7 @@ def _known(machine: Machine, found: dict[str, JointEstimate]) -> dict[str, Knowl
 
 
 def _not_separable(correlations: Correlations, computed: Sequence[str]) -> tuple[str, ...]:
-    """In words, what the records do not tell apart."""
+    """Parameters that are not identifiable separately, in words."""
     said = []
     for first, second, value in correlations.close():
         pair = f"{first} and {second}".replace("_", " ")

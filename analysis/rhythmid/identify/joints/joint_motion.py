@@ -1,8 +1,9 @@
-"""The motion of several joints as inverse dynamics needs it: for each joint its own, and what the rest of the body asks of it.
+"""Motion of several joints for inverse dynamics: each joint's own motion, and the force that the rest of the body
+requires.
 
-Along joint j the body asks for m_j a_j + c_j, with m_j the inertia that the joint's path has and the coupling c_j the rest of the
-inverse dynamics of the whole body (M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 for its linearity in the inertial
-parameters). So each joint is balanced as the one of a machine of one axis, with the same elements.
+Along joint j the body requires m_j a_j + c_j. Here m_j is the inertia of the joint's path, and the coupling c_j is
+the rest of the whole body's inverse dynamics (linear in the inertial parameters: M. Gautier, W. Khalil, Int. J.
+Robot. Res. 11 (1992) 362). So each joint has the balance of a machine with one axis, with the same elements.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,15 +32,15 @@ from rhythmid.record.joint_record import JointRecord, Taken
 from rhythmid.value import Value
 
 Array = NDArray[np.float64]
-# periods of the cut-off at both ends of a stretch, in which a filter that begins there errs by several times the noise (measured on
+# cut-off periods at both ends of a stretch in which the filter's transient is several times the noise (measured on
 # flights between contacts)
 CLEAR = 1.5
-SHORT = 400  # samples of a stretch, up to which its filter is a matrix
-FAINT = 1e-3  # of a joint's effort, below which what a link does to it is not looked at
+SHORT = 400  # largest number of samples in a stretch for which its filter is a matrix
+FAINT = 1e-3  # share of a joint's effort below which the effect of a link on it is neglected
 
 
 class JointBalance(Balance):
-    """A balance of many short stretches: the filter of each length is a matrix that is made once."""
+    """A balance of many short stretches: the filter for each length is a matrix that is computed once."""
 
     def filtered(self, signal: Array, period: float) -> Array:
         if len(signal) > SHORT:
@@ -54,14 +55,14 @@ def _filter(length: int, period: float, frequency: float) -> Array:
 
 
 def nothing(t):
-    """The force of the term that stands for the body's parameters: none, it is in the coupling."""
+    """Zero force, for the term that holds the body's parameters: their force is in the coupling."""
     return 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
-    """Motions of one stretch: pose, rate and acceleration (n, nv) of the whole body below `cut` [Hz], and the forces (n, nv) that
-    it asks for."""
+    """Motions of one stretch: pose, rate and acceleration (n, nv) of the whole body below `cut` [Hz], and the
+    forces (n, nv) that they require."""
 
     stretch: JointStretch
     time: Array
@@ -75,11 +76,12 @@ class BodyMotion:
 
 @dataclass(frozen=True, eq=False)
 class JointBalances:
-    """The balances of effort of all joints: of each its path as a model of one axis, and its motions.
+    """The effort balances of all joints: each joint's path as a model with one axis, and its motions.
 
-    `computed` are the joints whose effort is what their controller's known gains make of the reference; `leads` [s] of others are what the
-    references in their recorded efforts were ahead by, and are not in the motions. `rotor_like` are by joint the parameters of links that
-    do there what the rotor's inertia does, with how much of that [kg m²] a unit of each is.
+    `computed` are the joints whose effort is computed from the reference and their controller's known gains.
+    `leads` [s] of other joints are the leads of references in their recorded efforts, already removed from the
+    motions. `rotor_like` holds by joint the link parameters with the same effect there as the rotor's inertia, with
+    the inertia [kg m²] per unit of each.
     """
 
     machine: Machine
@@ -99,8 +101,8 @@ class JointBalances:
         records: Sequence[JointRecord],
         alike: "JointBalances | None" = None,
     ) -> "JointBalances":
-        """The balances of these records, filtered as those `alike` and without the same leads. Raises InputError where the records hold
-        too little."""
+        """The balances of these records, with the filters of `alike` and without the same leads. Raises InputError
+        where the records are too short."""
         stretches = joint_stretches(machine, records)
         cut, dominant = (alike.cut, alike.dominant) if alike else _cut(machine, stretches)
         bodies = [_body_motion(machine, one, cut) for one in stretches]
@@ -116,7 +118,8 @@ class JointBalances:
             if not alike:
                 rotor_like[joint] = _rotors(machine, joint, seen, names, columns, bodies)
             rotors = rotor_like[joint]
-            computed = joint in stretches[0].reference  # what a controller asks for goes into its actuator
+            # the force that a controller commands enters its actuator
+            computed = joint in stretches[0].reference
             taken = "before_actuator" if computed else records[0].taken
             models[joint] = joint_model(machine, joint, taken, seen, rotors)
             made = []
@@ -135,7 +138,7 @@ class JointBalances:
         return made.with_leads(alike.leads) if alike else made
 
     def with_leads(self, leads: Mapping[str, float]) -> "JointBalances":
-        """The balances with recorded efforts in which the references are older by these leads [s]."""
+        """The balances after removing these leads [s] of the references from the recorded efforts."""
         motions = dict(self.motions)
         for joint, lead in leads.items():
             gain = self.machine.paths[joint].value("position_control.proportional")
@@ -150,12 +153,12 @@ class JointBalances:
         return replace(self, motions=motions, leads={**self.leads, **leads})
 
     def links(self, joint: str) -> tuple[str, ...]:
-        """The links whose masses and inertias a joint feels, as "link.mass" and "link.inertia", and those whose payloads it would feel, as
-        "link.payload"."""
+        """Links to whose mass and inertia a joint is sensitive, as "link.mass" and "link.inertia", and those to
+        whose payload it would be, as "link.payload"."""
         return tuple(name.removeprefix(f"{BODY}.") for name in self.motions[joint][0].links)
 
     def rotors(self, joint: str) -> tuple[str, ...]:
-        """Those parameters of links that a joint feels as it does its rotor's inertia, which are bounded above."""
+        """Link parameters with the same effect at a joint as its rotor's inertia; they are bounded above."""
         return tuple(self.rotor_like[joint])
 
     @property
@@ -169,8 +172,8 @@ class JointBalances:
         return next(iter(self.bandwidths.values())).dominant
 
     def balance(self, joint: str, late: float = 0.0) -> Balance:
-        """The balance of one joint; a reference acts there `late` [s] after its stamp. Raises InputError where too few samples are
-        left."""
+        """The balance of one joint whose reference acts `late` [s] after its timestamp. Raises InputError where too
+        few samples are left."""
         motions = self.motions[joint]
         if late != 0.0:
             motions = [_later(motion, self.models[joint], late) for motion in motions]
@@ -178,7 +181,7 @@ class JointBalances:
 
 
 def _later(motion: Motion, model: Model, late: float) -> Motion:
-    """A motion whose reference acts `late` [s] later; one without a reference as it is."""
+    """A motion whose reference acts `late` [s] later; a motion without a reference is unchanged."""
     if motion.reference is None:
         return motion
     reference = replace(motion.reference, age=motion.reference.age + late)
@@ -188,9 +191,13 @@ def _later(motion: Motion, model: Model, late: float) -> Motion:
 def joint_model(
     machine: Machine, joint: str, taken: Taken, links: Sequence[str], rotors: Mapping[str, float]
 ) -> Model:
-    """The path of a joint as a model of one axis, with masses, inertias and payloads of links as parameters of a term `body`; without its
-    actuator where the effort was recorded behind that. A mass or an inertia that does what the rotor's does, one of `rotors`, may be less than given by
-    more than the whole rotor: any other change is the rotor's, of which files of robots know little."""
+    """The path of a joint as a model with one axis; masses, inertias and payloads of links are parameters of a term
+    `body`.
+
+    The actuator is left out where the effort was recorded after it. A mass or inertia in `rotors` has the same
+    effect as the rotor's inertia. Its upper bound is the given value minus the equivalent of the whole rotor: any
+    smaller change is attributed to the rotor, which files of robots seldom state well.
+    """
     path = machine.paths[joint]
     terms = [t for t in path.terms if taken != "after_actuator" or t.element.slot != "actuator"]
     known, values = machine.body.parameters, {}
@@ -204,7 +211,7 @@ def joint_model(
         acts="drive", candidate=False,
     )  # fmt: skip
     armature = machine.inertial.get(f"{joint}.armature")
-    # no rotor has a negative inertia
+    # a rotor's inertia is not negative
     least = max(path.mass.value - known[f"{joint}.armature"], 0.0)
     free = armature is not None and not armature.fixed
     mass = replace(path.mass, fixed=not free, bounds=(least, np.inf))
@@ -212,7 +219,7 @@ def joint_model(
 
 
 def _cut(machine: Machine, stretches: Sequence[JointStretch]) -> tuple[float, float]:
-    """The highest frequency of the fastest joint's motion, and the strongest of all."""
+    """Highest frequency [Hz] of the fastest joint's motion, and the strongest frequency [Hz] of all joints."""
     found = []
     for joint in machine.joints:
         place = machine.body.joints[joint].position
@@ -239,7 +246,8 @@ def _body_motion(machine: Machine, stretch: JointStretch, cut: float) -> BodyMot
 def _links(
     machine: Machine, joint: str, names: Sequence[str], columns: Sequence[Array], bodies: Sequence[BodyMotion]
 ) -> tuple[str, ...]:
-    """The masses and inertias of links that a joint feels, and the payloads that it would feel if they were as heavy as their links."""
+    """Masses and inertias of links to which a joint is sensitive, and the payloads to which it would be if they
+    were as heavy as their links."""
     whole, made = _felt(machine, joint, names, columns, bodies)
     felt = np.sqrt(np.mean(made**2, axis=0)) > FAINT * whole
     return tuple(name for name, one in zip(names, felt, strict=True) if one)
@@ -249,7 +257,8 @@ def _rotors(
     machine: Machine, joint: str, links: Sequence[str], names: Sequence[str], columns: Sequence[Array],
     bodies: Sequence[BodyMotion],
 ) -> dict[str, float]:  # fmt: skip
-    """Those among these parameters that a joint feels as it does its rotor's inertia, and how much of that a unit of each is."""
+    """Those of these parameters with the same effect at a joint as its rotor's inertia, with the inertia per unit
+    of each."""
     own = machine.body.joints[joint].velocity
     whole, made = _felt(machine, joint, names, columns, bodies)
     rotor = np.concatenate([one.acceleration[:, own] for one in bodies])
@@ -266,8 +275,8 @@ def _rotors(
 def _felt(
     machine: Machine, joint: str, names: Sequence[str], columns: Sequence[Array], bodies: Sequence[BodyMotion]
 ) -> tuple[float, Array]:
-    """Size (rms) of the force that the body asks of a joint, and what links do to that (n, p): a mass and a payload as heavy as their link, an
-    inertia as large as that about the hinge."""
+    """Size (rms) of the force that the body requires at a joint, and the effects of links on it (n, p): of a mass,
+    of a payload as heavy as its link, and of an inertia as large as that about the hinge."""
     own = machine.body.joints[joint].velocity
     whole = np.concatenate([one.force[:, own] for one in bodies])
     made = np.concatenate([one[:, own] for one in columns]) * [_unit(machine, name) for name in names]
@@ -275,7 +284,7 @@ def _felt(
 
 
 def _unit(machine: Machine, name: str) -> float:
-    """The size at which a parameter of a link is looked at."""
+    """Reference size of a link's parameter."""
     link, kind = split(name)
     return machine.body.about_hinge(link) if kind == TURNING else machine.body.parameters[f"{link}.{MASS}"]
 
@@ -307,7 +316,7 @@ def _motion(
 
 
 def _reference(machine: Machine, joint: str, body: BodyMotion) -> Reference:
-    """The reference of a joint's controller, which works at the body's step."""
+    """The reference of a joint's controller, which runs at the body's time step."""
     stretch, step = body.stretch, machine.body.step
     held = 0.0 if joint in stretch.smooth else stretch.period
     forward = stretch.forward.get(joint)
@@ -323,12 +332,12 @@ def _reference(machine: Machine, joint: str, body: BodyMotion) -> Reference:
 
 
 def _decimated(body: BodyMotion, signal: Array) -> Array:
-    """A signal at a stretch's samples as one at the motion's."""
+    """A signal at a stretch's samples, decimated to the motion's samples."""
     return low_pass(signal, body.stretch.period, 1.0 / (FINER * body.period))[:: body.every]
 
 
 def _bandwidth(motions: Sequence[Motion], cut: float, dominant: float) -> Bandwidth:
-    """The bandwidth of a joint's effort beside what the rest of the body asks for."""
+    """The bandwidth of a joint's effort, given the force that the rest of the body requires."""
     own = [
         replace(one, effort=one.effort - (0.0 if one.coupling is None else one.coupling)) for one in motions
     ]

@@ -1,10 +1,10 @@
-"""Joints that were recorded in another order, in another unit or with their sign turned round: found by the balance of effort.
+"""Detects joints recorded in another order, unit or sign, by the effort balance.
 
-As on one axis (`identify/plausibility.py`) a change is believed only where the record as declared cannot be explained, and the changed one
-can. Of several joints the changes are sought one after another, from the one that helps most: another factor for one joint or for all,
-an exchange of two joints, a cycle of three. What turns out to help nothing is taken back. Efforts in unknown units, such as a motor's
-current, are sought last: there every effort may have a factor of its own, which a balance tells of joints whose weight or
-coupling acts on them.
+As for one axis (`identify/plausibility.py`), a change is accepted only where the record as declared cannot be
+explained and the changed record can. With several joints, changes are searched one after another, the most helpful
+first: another factor for one joint or for all, an exchange of two joints, a cycle of three. Changes that do not
+help in the end are removed. Efforts in unknown units, such as a motor's current, are searched last. There every
+effort may have its own factor; the balance determines it for joints on which weight or coupling acts.
 """
 
 import math
@@ -25,20 +25,23 @@ from rhythmid.record.joint_record import JointRecord
 from rhythmid.report.quantity import number
 
 Readings = tuple[Reading, ...]
-CLEARLY = 0.5  # of what all efforts leave as declared, that another reading may leave at most
-FLOOR = 0.01  # of an effort, below which it does not matter how little is left
-HELPS = 0.05  # fall of the mean logarithm of what is left, by which a change has to help to be made, and not to be taken back
-POSITIONS = {True: (DEGREE, 1.0 / DEGREE), False: (1e-3, 1e3)}  # factors of joints that turn, and that slide
+CLEARLY = 0.5  # largest ratio of another reading's effort residual to that of the declared one
+FLOOR = 0.01  # share of an effort below which residuals are not compared further
+HELPS = 0.05  # least fall of the mean logarithm of the residuals for a change to be made and kept
+# factors for rotational and for prismatic joints
+POSITIONS = {True: (DEGREE, 1.0 / DEGREE), False: (1e-3, 1e3)}
 
 
 def check_joints(machine: Machine, records: Sequence[JointRecord]) -> None:
-    """Raise InputError with the likely mend where the efforts fit the body only with another order, unit or sign of recorded joints."""
+    """Raise InputError with the likely correction where the efforts fit the body only with another order, unit or
+    sign of recorded joints."""
     if (mend := likely_joint_mend(machine, records)) is not None:
         raise InputError(mend)
 
 
 def likely_joint_mend(machine: Machine, records: Sequence[JointRecord]) -> str | None:
-    """What of the joints seems to be declared wrongly, and how to mend it, in one line; None where the efforts are plausible."""
+    """The likely wrong declaration of the joints and its correction, in one line; None where the efforts are
+    plausible."""
     if not records:
         return None
     record = max(records, key=_moved)
@@ -59,17 +62,18 @@ def likely_joint_mend(machine: Machine, records: Sequence[JointRecord]) -> str |
 
 
 def _moved(record: JointRecord) -> float:
-    """How much the joints of a record move, in each one's own unit."""
+    """Size of the joints' motion in a record, each in its own unit."""
     return float(sum(np.std(one.output.value) for one in record.joints.values()))
 
 
 def _score(balanced: Iterable[Balanced]) -> float:
-    """Mean logarithm of what is left of the efforts: one joint that comes right counts, whatever the others do."""
+    """Mean logarithm of the effort residuals: the improvement of one joint counts, whatever the other joints do."""
     return float(np.mean([math.log(one.left + FLOOR) for one in balanced]))
 
 
 def _searched(motion: RecordedMotion, free: bool) -> Readings:
-    """The reading under which least is left of the efforts, with no more changes than help; with `free`, with each effort's factor."""
+    """The reading with the smallest effort residuals and only helpful changes; with `free`, with a factor for each
+    effort."""
 
     def score(readings: Readings) -> float:
         return _score(motion.balanced(readings, free))
@@ -85,7 +89,8 @@ def _searched(motion: RecordedMotion, free: bool) -> Readings:
         if found > least - HELPS:
             break
         best, least = reading, found
-    for place, given in enumerate(motion.as_declared):  # what has helped on the way may help no more
+    # an earlier change may not help any more after later ones
+    for place, given in enumerate(motion.as_declared):
         for one in (
             replace(best[place], position=given.position),
             replace(best[place], effort=given.effort),
@@ -98,7 +103,7 @@ def _searched(motion: RecordedMotion, free: bool) -> Readings:
 
 
 def _in_units(motion: RecordedMotion, readings: Readings) -> Readings:
-    """The reading with the factor that each effort needs where that is no physics."""
+    """The reading with a factor for each effort where that factor is no physical effect."""
     made = []
     for joint, one, found in zip(motion.joints, readings, motion.balanced(readings, True), strict=True):
         factor = 1.0 / found.gain if found.gain > 0.0 else 1.0
@@ -113,7 +118,7 @@ def _with(readings: Readings, place: int, one: Reading) -> Readings:
 
 
 def _changed(motion: RecordedMotion, readings: Readings, free: bool) -> Iterator[Readings]:
-    """Readings with one change more: of all joints, of one, or of two that are exchanged."""
+    """Readings with one further change: of all joints, of one, or an exchange of two."""
     turned = [replace(one, effort=-one.effort) for one in readings]
     yield tuple(turned)
     yield tuple(replace(one, position=-one.position) for one in readings)
@@ -133,14 +138,14 @@ def _changed(motion: RecordedMotion, readings: Readings, free: bool) -> Iterator
 
 
 def _cycled(readings: Readings) -> Iterator[Readings]:
-    """Readings with three joints in another order."""
+    """Readings with three joints permuted cyclically."""
     for one, other, third in combinations(range(len(readings)), 3):
         yield _moved_round(readings, (one, other, third))
         yield _moved_round(readings, (one, third, other))
 
 
 def _moved_round(readings: Readings, places: Sequence[int]) -> Readings:
-    """The reading with the sources of some joints moved on by one."""
+    """The reading with the sources of some joints shifted cyclically by one."""
     made = list(readings)
     for place, following in zip(places, (*places[1:], places[0]), strict=True):
         made[place] = replace(readings[place], source=readings[following].source)
@@ -148,8 +153,8 @@ def _moved_round(readings: Readings, places: Sequence[int]) -> Readings:
 
 
 def _convinces(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]) -> bool:
-    """Whether a reading explains what the declared one does not, and does so by the body: an effort that a controller asks for against the
-    motion is, turned round, what a spring and a damper would need."""
+    """Whether a reading explains by the body what the declared one does not. An effort that a controller applies
+    against the motion looks, with the opposite sign, like that of a spring and a damper."""
     left = motion.balanced(found)
     changed = [k for k, (one, own) in enumerate(zip(found, motion.as_declared, strict=True)) if one != own]
     before, after = (_rms(one.left for one in many) for many in (declared, left))
@@ -198,7 +203,7 @@ def _words(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]
 
 
 def _scale(factors: Mapping[str, float], joints: Sequence[str]) -> str:
-    """The words of signals.yaml that multiply a channel of these joints by factors."""
+    """Text for signals.yaml that multiplies a channel of these joints by factors."""
     written = {joint: _factor(factor) for joint, factor in factors.items()}
     if len(written) == len(joints) and len(set(written.values())) == 1:
         return f"scale: {written[joints[0]]}"
@@ -206,13 +211,13 @@ def _scale(factors: Mapping[str, float], joints: Sequence[str]) -> str:
 
 
 def _factor(factor: float) -> str:
-    """A factor as it is written into signals.yaml."""
+    """A factor in the notation of signals.yaml."""
     exact = any(abs(abs(factor) / one - 1.0) < 1e-9 for one in (DEGREE, 1.0 / DEGREE))
     return f"{factor:.6g}" if exact else f"{float(f'{factor:.2g}'):g}"
 
 
 def _guess(channel: str, factor: float, turns: bool) -> str:
-    """What a channel that has to be multiplied by this factor seems to be."""
+    """What a channel that has to be multiplied by this factor seems to be, in words."""
     turned = " with its sign turned round" if factor < 0.0 else ""
     size = abs(factor)
     if size == 1.0:

@@ -14,7 +14,8 @@ from rhythmid.report.robot_figure import DrawnJoint
 
 
 def present_identified(found: MachineIdentification, given: Machine, source: str, command: str = "") -> Page:
-    """The page of an identification; `given` is the machine as it was, `source` names model and records, `command` the command line."""
+    """Report page of an identification. `given` is the machine before it, `source` names model and records,
+    `command` is the command line."""
     faults = dict.fromkeys(found.worse, "worse than given") | dict.fromkeys(
         found.not_identified, "not identified"
     )

@@ -1,9 +1,9 @@
-"""How recorded joints may be read: which is which, in which units and with which signs; and what a body then leaves of the efforts.
+"""Readings of recorded joints (their order, units and signs), and the effort residuals that a body leaves under each.
 
-Natural laws of a body do not forgive a wrong reading: gravity turns with the angles, and what moves one joint is felt at the others. So the
-body of the file is asked for its force along the motion as it would be under a reading, and each joint's effort is fitted with it and with
-the losses that no file knows: a rotor, a damper, a dry friction and a spring, none of which is negative, and a constant. A wrong sign of an
-effort would need negative ones.
+The dynamics of a body are sensitive to a wrong reading: gravity depends on the angles, and the motion of one joint
+acts on the others. So the force of the file's body is computed along the motion under a reading. Each joint's
+effort is fitted with this force and with losses that no file states: a rotor, a damper, dry friction and a spring,
+all nonnegative, and a constant. A wrong sign of an effort would need negative losses.
 """
 
 import math
@@ -25,15 +25,15 @@ from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
 
 Array = NDArray[np.float64]
-POSES = 300  # at which readings are compared
-FEW = 60  # poses without contact, below which a reading is not judged
-NEIGHBOURS = 3  # poses across the reach of the filter at which contact is looked for
-LONGEST = 60.0  # [s] of a record that are looked at, from its start
+POSES = 300  # number of poses at which readings are compared
+FEW = 60  # least number of poses without contact for a reading
+NEIGHBOURS = 3  # poses within the filter's length at which contact is checked
+LONGEST = 60.0  # [s] length of a record that is used, from its start
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How one joint may have been recorded: as the joint number `source`, its position and its effort to be multiplied by factors.
+    """One reading of a joint: recorded as joint number `source`, with factors for its position and its effort.
 
     An effort that was not recorded follows from the positions and has their factor.
     """
@@ -45,8 +45,8 @@ class Reading:
 
 @dataclass(frozen=True)
 class Balanced:
-    """What a body leaves of a joint's effort, as a share of its variation, and the `gain` of that effort over what the body asks for;
-    `bare` is what a spring, a damper and a dry friction leave by themselves."""
+    """Effort residual of a joint as a share of the effort's variation, and the `gain` of the effort over the force
+    that the body requires. `bare` is the residual with a spring, a damper and dry friction alone."""
 
     left: float
     gain: float = 1.0
@@ -54,9 +54,10 @@ class Balanced:
 
 
 class RecordedMotion:
-    """Poses of a record and the efforts at them, for whatever reading of the driven joints.
+    """Poses of a record and the efforts at them, for any reading of the driven joints.
 
-    With `touching`, poses in contact under a reading are left out of it. Without, they are not looked for, which takes a fifth of the time.
+    With `touching`, poses that are in contact under a reading are left out. Without it, contact is not checked,
+    which takes a fifth of the time.
     """
 
     def __init__(self, machine: Machine, record: JointRecord, touching: bool = False) -> None:
@@ -65,7 +66,7 @@ class RecordedMotion:
         body = machine.body
         self.joints = machine.joints
         self.body, self._touching = body, touching
-        # contacts are looked for under each reading: degrees that are taken for radians put the feet anywhere
+        # contact is checked for each reading: with degrees taken for radians the feet are anywhere
         stretches = joint_stretches(replace(machine, body=replace(body, contacts=False)), [part])
         self.computed = tuple(joint for joint in self.joints if joint in stretches[0].reference)
         cut = _cut(machine, stretches)
@@ -75,7 +76,7 @@ class RecordedMotion:
             np.concatenate([getattr(one, name)[::every] for one in found])
             for name in ("pose", "rate", "acceleration", "effort")
         )
-        # poses before and after each, within the reach of the filter
+        # poses before and after each, within the filter's length
         near = [_near(len(one.pose), one.period, cut) for one in found]
         self._beside = [
             np.concatenate([one.pose[at[::every]] for one, at in zip(found, ats, strict=True)])
@@ -88,11 +89,11 @@ class RecordedMotion:
 
     @cached_property
     def as_declared(self) -> tuple[Reading, ...]:
-        """The reading that signals.yaml declares."""
+        """The reading declared in signals.yaml."""
         return tuple(Reading(k) for k in range(len(self.joints)))
 
     def balanced(self, readings: tuple[Reading, ...], free: bool = False) -> tuple[Balanced, ...]:
-        """What the body leaves of each joint's effort under a reading; with `free`, the effort may be in any unit."""
+        """Effort residuals of each joint under a reading; with `free`, efforts may be in any unit."""
         sources = [one.source for one in readings]
         factors = np.array([one.position for one in readings])
         clear = np.ones(len(self._pose), dtype=bool)
@@ -125,7 +126,7 @@ class RecordedMotion:
 
 
 def _fitted(effort: Array, asked: Array, x: Array, v: Array, a: Array, free: bool) -> Balanced:
-    """What is left of an effort (n,) beside the force that a body asks for, losses fitted."""
+    """Residual of an effort (n,) after a fit of the force that the body requires and of losses."""
     losses = np.column_stack([v, np.sign(v), x])
     columns = np.column_stack([losses, a, asked]) if free else np.column_stack([losses, a])
     if np.ptp(effort) == 0.0 or not np.all(np.isfinite(asked)):
@@ -137,7 +138,8 @@ def _fitted(effort: Array, asked: Array, x: Array, v: Array, a: Array, free: boo
 
 
 def _without_sign(columns: Array, wanted: Array) -> tuple[Array, float]:
-    """Factors (p,), none negative, of the columns (n, p) that come nearest to what is wanted (n,) beside a constant, and the rms left."""
+    """Nonnegative factors (p,) of the columns (n, p) that fit `wanted` (n,) best together with a constant, and the
+    rms residual."""
     columns, wanted = columns - columns.mean(axis=0), wanted - wanted.mean()
     norms = np.linalg.norm(columns, axis=0)
     norms[norms == 0.0] = 1.0
@@ -160,7 +162,8 @@ def _cut(machine: Machine, stretches: list[JointStretch]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Sampled:
-    """Poses, rates, accelerations (n, nv) and efforts (n, joints) of a stretch below the cut-off, a `period` [s] apart."""
+    """Poses, rates, accelerations (n, nv) and efforts (n, joints) of a stretch below the cut-off, at intervals
+    `period` [s]."""
 
     pose: Array
     rate: Array
@@ -187,7 +190,7 @@ def _places(machine: Machine) -> list[tuple[str, int]]:
 
 
 def _effort(model: Model, joint: str, stretch: JointStretch, place: int) -> Array:
-    """Effort (n,) of a joint, or what its controller's known gains make of the reference."""
+    """Effort (n,) of a joint as recorded, or as computed from the reference and its controller's known gains."""
     if joint in stretch.effort:
         return stretch.effort[joint]
     x = stretch.pose[:, place]
@@ -201,7 +204,7 @@ def _effort(model: Model, joint: str, stretch: JointStretch, place: int) -> Arra
 
 
 def _near(length: int, period: float, cut: float) -> tuple[NDArray[np.intp], ...]:
-    """Of each sample of a stretch the places of itself and of those within the reach of its filter, on either side."""
+    """For each sample of a stretch, the indices of itself and of samples within the filter's length on either side."""
     reach = math.ceil(CLEAR / (cut * period))
     steps = np.unique(np.linspace(-reach, reach, NEIGHBOURS).astype(int))
     return tuple(np.clip(np.arange(length) + step, 0, length - 1) for step in steps)

@@ -1,4 +1,4 @@
-"""What was recorded of a machine of several joints, in stretches without a gap and without contact, on one grid for all joints."""
+"""Recorded data of a machine with several joints, in stretches without gaps and contact, on one grid for all joints."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -18,19 +18,22 @@ from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Record, Uniform
 
 Array = NDArray[np.float64]
-TOUCHING_DISTANCE = 0.002  # [m] between two surfaces, below which they may touch: what an encoder and a link's shape are wrong by
-WHOLE = 0.99  # of a sample that has to be no bridge over a gap
-MOST_POSES = (
-    4000  # poses at which contact is looked for, in a record: contacts last longer than the samples between
-)
+# [m] distance of two surfaces below which they may touch: errors of encoders and of link shapes
+TOUCHING_DISTANCE = 0.002
+WHOLE = 0.99  # share of a sample that must be measured rather than interpolated over a gap
+# poses of a record at which contact is checked: contacts last longer than the time between them
+MOST_POSES = 4000
 
 
 @dataclass(frozen=True, eq=False)
 class JointStretch:
-    """One stretch of a record: time (n,) [s], pose (n, nv) of the whole body, and by joint (n, joints) the effort, where that was
-    recorded or is the command, and the reference of its controller over the whole record, of which the stretch is that `part`, with what the
-    controller adds to its force. `held` are
-    the references that are held while the effort was recorded in step with them, `smooth` the joints whose references go on between their stamps."""
+    """One stretch of a record on a common grid.
+
+    It holds time (n,) [s], pose (n, nv) of the whole body, and for each joint (n, joints) the effort where it was
+    recorded or is the command. The controller's reference, with the feed-forward that the controller adds to its
+    force, is stored for the whole record; the stretch is its `part`. `held` are references that are held while the
+    effort was recorded in step with them. `smooth` are the joints whose references move between their timestamps.
+    """
 
     record: int
     name: str
@@ -56,7 +59,7 @@ def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[Jo
             pose[:, machine.body.joints[joint].position] = one.output
         every = max(1, len(grid) // MOST_POSES)
         touching = machine.body.touches(pose[::every], TOUCHING_DISTANCE)
-        beside = touching.copy()  # a contact may begin between the poses that were looked at
+        beside = touching.copy()  # a contact may begin between the checked poses
         beside[1:] |= touching[:-1]
         beside[:-1] |= touching[1:]
         flying = ~np.repeat(beside, every)[: len(grid)]
@@ -127,7 +130,8 @@ def check_recorded(machine: Machine, record: JointRecord) -> None:
 def _common(
     machine: Machine, record: JointRecord
 ) -> tuple[Array, float, dict[str, Uniform], NDArray[np.bool_]]:
-    """The grid of the first joint within what all have in common, every joint's channels there, and where none has a gap."""
+    """The grid of the first joint within the time that all joints share, every joint's channels there, and the
+    samples without a gap."""
     every = dict(record.joints)
     if record.base is not None:
         every[machine.body.base] = record.base
@@ -146,7 +150,7 @@ def _common(
 
 
 def _at(grid: Uniform, time: Array) -> Uniform:
-    """A joint's channels at other times."""
+    """A joint's channels, interpolated at other times."""
     if len(grid.time) == len(time) and np.abs(grid.time - time).max() < 1e-9:
         return grid
 
@@ -165,7 +169,8 @@ def _at(grid: Uniform, time: Array) -> Uniform:
 
 
 def _held(machine: Machine, record: JointRecord, joint: str, grid: Array) -> HeldReference | None:
-    """The reference of a joint whose effort was recorded in step with it, where it is held between its stamps."""
+    """The reference of a joint that is held between its timestamps, where the effort was recorded in step with it;
+    else None."""
     one = record.joints[joint]
     given = one.reference or (one.input if one.input_kind == "reference" else None)
     if one.effort is None or given is None or one.hold != "zero" or not machine.controlled(joint):

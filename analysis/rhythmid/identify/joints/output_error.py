@@ -1,8 +1,9 @@
-"""Free runs of a machine of several joints over the stretches of its records: how well it predicts the motion, and parameters that make it
-predict better.
+"""Free runs of a machine with several joints over the stretches of its records: prediction error, and refinement of
+parameters.
 
-A stretch begins where contact ends, at the measured pose and rates, and the machine runs from there by its commands alone. Limbs of a fixed
-base do not feel one another: a derivative is taken for one parameter of every limb in the same run.
+A stretch begins where contact ends, at the measured pose and rates. From there the commands alone drive the
+machine. With a fixed base the limbs do not affect one another, so one run gives the derivative with respect to one
+parameter of every limb.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,16 +27,16 @@ from rhythmid.record.record import Channel
 from rhythmid.simulation.signal import Hold, continuous
 
 Array = NDArray[np.float64]
-DIFFERENCE = 1e-3  # of a parameter's spread: step of its finite difference
-BEFORE = 1.0  # [s] for which a command is taken to have had its first value, longer than any delay
-DIVERGED = 10.0  # times the motion, the error that a run counts for which diverges
-TRIALS = 8  # runs of the whole with other parameters, at most
+DIFFERENCE = 1e-3  # finite-difference step, relative to a parameter's standard deviation
+BEFORE = 1.0  # [s] time before the record during which a command has its first value; longer than any delay
+DIVERGED = 10.0  # error, as a multiple of the motion, that is assigned to a diverging run
+TRIALS = 8  # largest number of simulations of all stretches with changed parameters
 
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """Free runs: by joint the error (rms) as a share of the motion's standard deviation; in how many of so many `stretches` the run `diverged`,
-    and in words the first."""
+    """Free-run error (rms) of each joint as a share of its motion's standard deviation; the number of `stretches`,
+    the number of runs that `diverged`, and the first of these in words."""
 
     nrmse: dict[str, float]
     stretches: int
@@ -43,7 +44,7 @@ class FreeRuns:
     first: str = ""
 
     def told(self, name: str) -> tuple[str, ...]:
-        """In one line, that runs with the values of this name diverge; nothing where none does."""
+        """One line that runs with the values called `name` diverge; empty where none does."""
         if not self.diverged:
             return ()
         runs = f"{self.diverged} of {self.stretches} free runs" if self.stretches > 1 else "the free run"
@@ -54,7 +55,7 @@ class FreeRuns:
 
 @dataclass(frozen=True)
 class Knowledge:
-    """What is known of a parameter before the free runs: normal, within bounds."""
+    """Prior of a parameter before the free runs: normal, within bounds."""
 
     mean: float
     std: float
@@ -63,7 +64,8 @@ class Knowledge:
 
 
 def commands(machine: Machine, record: JointRecord) -> tuple[dict[str, PPoly], dict[str, PPoly]]:
-    """What drives each joint, and what its controller adds. Raises InputError where a driven joint has neither."""
+    """The signal that drives each joint, and the feed-forward of its controller. Raises InputError where a driven
+    joint has neither."""
     drives: dict[str, PPoly] = {}
     forward: dict[str, PPoly] = {}
     for joint in machine.joints:
@@ -82,7 +84,8 @@ def commands(machine: Machine, record: JointRecord) -> tuple[dict[str, PPoly], d
 
 
 def _signal(channel: Channel, hold: Hold) -> PPoly:
-    """A channel as a signal that had its first value before it was recorded: what is late begins with it, too."""
+    """A channel as a signal that had its first value before the record began, so that delayed signals start with
+    it, too."""
     time = np.concatenate([[channel.time[0] - BEFORE], channel.time])
     return continuous(time, np.concatenate([channel.value[:1], channel.value]), hold)
 
@@ -95,7 +98,7 @@ def errors_of(machine: Machine, balances: JointBalances, records: Sequence[Joint
 def _runs(
     machine: Machine, balances: JointBalances, records: Sequence[JointRecord]
 ) -> list[tuple[Array, str]]:
-    """Of each stretch the errors (n, joints) of a free run as shares of the joints' motion, and in words why it has no end."""
+    """For each stretch the free-run errors (n, joints) as shares of the joints' motion, and in words why it diverged."""
     sizes = _sizes(balances, machine)
     drives = [commands(machine, record) for record in records]
     worker = machine.body.worker()
@@ -112,7 +115,8 @@ def _runs(
 
 
 def _astray(machine: Machine, body: BodyMotion, errors: Array) -> str:
-    """In words, where a run of errors (n, joints) first is as far off as one that diverges counts for; nothing where it is nowhere."""
+    """In words, where the errors (n, joints) of a run first reach the value of a diverging run; empty where they do
+    not."""
     far = np.abs(errors) >= DIVERGED
     if not far.any():
         return ""
@@ -122,7 +126,7 @@ def _astray(machine: Machine, body: BodyMotion, errors: Array) -> str:
 
 
 def free_runs(machine: Machine, balances: JointBalances, records: Sequence[JointRecord]) -> FreeRuns:
-    """How well the machine predicts these records' motion."""
+    """Prediction error of the machine for these records' motion."""
     made = _runs(machine, balances, records)
     errors = np.sqrt(np.mean(np.concatenate([one for one, _ in made]) ** 2, axis=0))
     reasons = [reason for _, reason in made if reason]
@@ -138,9 +142,10 @@ def refine(
     known: Mapping[str, Knowledge],
     noise: float,
 ) -> tuple[Machine, dict[str, float], Correlations]:
-    """The machine whose named parameters fit the free runs, their standard deviations and their correlations.
+    """The machine whose named parameters fit the free runs, with their standard deviations and correlations.
 
-    `noise` is the error that is expected of a right model, as a share of the motion: it weighs the runs against what is `known`.
+    `noise` is the expected free-run error of a correct model, as a share of the motion. It weights the runs against
+    the prior `known`.
     """
     names = list(known)
     mean, std, low, high = (
@@ -184,12 +189,12 @@ def refine(
 
 
 def _repeats(balances: JointBalances) -> float:
-    """Samples in a quarter of the motion's strongest period: errors of a free run repeat one another for about as long."""
+    """Samples in a quarter of the motion's strongest period: about the correlation time of free-run errors."""
     return max(0.25 / (balances.dominant * balances.bodies[0].stretch.period), 1.0)
 
 
 def _together(machine: Machine, names: Sequence[str]) -> list[list[tuple[int, list[int]]]]:
-    """Groups of parameters of different limbs, each as its place and the places of the joints that it moves."""
+    """Groups of parameters of different limbs, each with its index and the indices of the joints that it affects."""
     limb = {joint: _limb(machine, joint) for joint in machine.joints}
     joints = {one: [k for k, j in enumerate(machine.joints) if limb[j] == one] for one in set(limb.values())}
     waiting: dict[int, list[tuple[int, list[int]]]] = {one: [] for one in joints}
@@ -206,7 +211,8 @@ def _together(machine: Machine, names: Sequence[str]) -> list[list[tuple[int, li
 
 
 def _limb(machine: Machine, joint: str) -> int:
-    """Number of the link next to a fixed base on the way from a joint; one for all where the base moves."""
+    """Number of the link next to a fixed base on the path from a joint; one number for all joints where the base
+    moves."""
     if machine.body.base != FIXED:
         return 0
     model = machine.body.model

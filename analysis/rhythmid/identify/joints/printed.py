@@ -1,4 +1,4 @@
-"""An identification of several joints as text on a terminal."""
+"""An identification of several joints as text for a terminal."""
 
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def show_identification(found: "MachineIdentification", console: Console) -> None:
-    """Print an identification: parameters, inertias, errors, and what the records do not tell apart."""
+    """Print an identification: parameters, inertias, errors, and parameters that are not identifiable separately."""
     if not found.usable:
         missed = ", ".join(map(escape, found.not_identified))
         console.print(

@@ -1,7 +1,8 @@
-"""By how much later than their stamps controllers' references act, where the efforts are made from them and the controllers' gains.
+"""Delay of controllers' references relative to their timestamps, where efforts are computed from references and gains.
 
-The delay of each joint is a parameter of its balance of effort, with an interval. References of several joints usually come in one message, so
-that all have one delay: the one that most joints agree with is shared, and a test says whether all do.
+The delay of each joint is a parameter of its effort balance and has an interval. References of several joints
+usually arrive in one message, so all have one delay. The delay with which most joints agree is shared. A test says
+whether all joints agree.
 """
 
 from collections.abc import Sequence
@@ -22,13 +23,16 @@ from rhythmid.identify.student import weights_of
 from rhythmid.statistics import NORMAL_95
 
 Array = NDArray[np.float64]
-LONGEST_REFERENCE_DELAY = 0.1  # [s] in which a reference acts at the latest
-FIRST = 3  # Gauss-Newton steps of the fit about which delays are scanned: the parameters are nearly linear
-# of a sample: what jitter of stamps and interpolation add to the standard deviation of a joint's delay (measured: delays of joints with one bus
-# scatter by 0.01 to 0.02 of a sample, their standard deviations by the noise alone are smaller)
+LONGEST_REFERENCE_DELAY = 0.1  # [s] largest delay of a reference
+FIRST = 3  # Gauss-Newton steps of the fit before the scan of delays: the parameters are nearly linear
+# share of a sample that timestamp jitter and interpolation add to the standard deviation of a joint's delay
+# (measured: delays of joints on one bus scatter by 0.01 to 0.02 of a sample; their standard deviations from noise
+# alone are smaller)
 ROUGH = 0.03
-AGREES = 0.5  # of a sample: standard deviation within which joints count as agreeing, as a missing effect may turn the phase of one
-EQUAL = 0.01  # probability of so unequal delays by chance, below which not all joints have the shared one
+# share of a sample: standard deviation within which joints count as agreeing, as a missing effect may shift the
+# phase of one
+AGREES = 0.5
+EQUAL = 0.01  # probability of such a scatter of equal delays below which not all joints share one delay
 
 
 @dataclass(frozen=True)
@@ -46,9 +50,9 @@ class Delay:
 
 @dataclass(frozen=True)
 class ReferenceDelay:
-    """The delay [s] that references have beyond the model's: of each joint, and the one that is shared by those that `agree`.
+    """Delay [s] of references beyond the model's delays: of each joint, and the shared one of those that `agree`.
 
-    `chance` is the probability of delays as unequal as these where all joints have the same one; None of one joint.
+    `chance` is the probability of delays as unequal as these if all joints have the same delay; None for one joint.
     """
 
     shared: Delay
@@ -58,7 +62,7 @@ class ReferenceDelay:
 
     @cached_property
     def equal(self) -> bool:
-        """Whether the records contradict one delay for all joints."""
+        """Whether the records are consistent with one delay for all joints."""
         return self.chance is None or self.chance >= EQUAL
 
     @property
@@ -82,7 +86,7 @@ class ReferenceDelay:
 
 @threadpool_limits.wrap(limits=1)
 def reference_delay(balances: JointBalances, joints: Sequence[str]) -> ReferenceDelay:
-    """The delays at which the paths of these joints, their free parameters fitted, predict the efforts best.
+    """The delays at which the paths of these joints, with their free parameters fitted, predict the efforts best.
 
     Raises InputError where no joint can be fitted."""
     found: dict[str, Delay] = {}
@@ -100,7 +104,7 @@ def reference_delay(balances: JointBalances, joints: Sequence[str]) -> Reference
 
 
 def delay_fit(balance: Balance, balances: JointBalances, joint: str) -> EffortFit:
-    """The fit of a joint's path with the delay of its reference free, from the best of a scan."""
+    """The fit of a joint's path with the delay of its reference free, started at the best point of a scan."""
     model = balances.models[joint]
     wide = Alignment(LONGEST_REFERENCE_DELAY, -FARTHEST * balance.period, LONGEST_REFERENCE_DELAY)
     first = fit_effort(balance, model, steps=FIRST)
@@ -120,7 +124,8 @@ def delay_fit(balance: Balance, balances: JointBalances, joint: str) -> EffortFi
 
 
 def shared(joints: dict[str, Delay], period: float) -> ReferenceDelay:
-    """The delay that most joints agree with; of as many on either side the shorter one, for an element more makes a reference later."""
+    """The delay with which most joints agree. In a tie the shorter one is taken, because a further element makes a
+    reference later."""
     names = list(joints)
     values = np.array([one.value for one in joints.values()])
     variances = np.array([one.std**2 for one in joints.values()])
@@ -134,7 +139,7 @@ def shared(joints: dict[str, Delay], period: float) -> ReferenceDelay:
     spread = float((weights[some] * (values[some] - middle) ** 2).sum()) / max(int(some.sum()) - 1, 1)
     std = np.sqrt(
         max(spread, 1.0) / weights[some].sum()
-    )  # as wide as they scatter (R. T. Birge, Phys. Rev. 40 (1932) 207)
+    )  # widened to their scatter (R. T. Birge, Phys. Rev. 40 (1932) 207)
     chance = None
     if len(names) > 1:
         mean = float(weights @ values / weights.sum())

@@ -1,9 +1,11 @@
-"""By how much the reference in a recorded effort is ahead of the one that acts, where it is held between its stamps.
+"""Lead of the reference in a recorded effort over the acting reference, where references are held between timestamps.
 
-A drive that reports its effort at the instant at which a new reference has come tells k_p (r - x) - k_d v of that instant, although on
-average over the period T an older reference acts: by T/2, less the half of a controller's own step. One that reports just before is late by
-as much. This is so of the part of the reference alone, so no alignment of effort and motion puts it right: in a balance it is k_p T/2 of
-damping and k_d T/2 of inertia. An effort that is the mean over T is right, and so is on average one that is not in step with the reference.
+Suppose a drive reports its effort at the instant at which a new reference arrives. It then reports k_p (r - x) -
+k_d v of that instant. On average over the period T an older reference acts, by T/2 minus half of the controller's
+own step. A drive that reports just before the new reference has the same error in the other direction. Only the
+part of the reference is affected, so no alignment of effort and motion corrects it. In a balance it acts like
+damping k_p T/2 and inertia k_d T/2. An effort that is the mean over T is correct. So is, on average, an effort that
+is not in step with the reference.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,26 +17,26 @@ from numpy.typing import NDArray
 from rhythmid.record.record import Channel
 
 Array = NDArray[np.float64]
-IN_STEP = 0.9  # length of the mean unit vector of the phases: stamps that scatter by up to 7 % of the period
-TAKEN_TOGETHER_SHARE = (
-    0.1  # of the period before a stamp of the reference, within which an effort counts as taken with it
-)
+# length of the mean unit vector of the phases: timestamps that scatter by up to 7 % of the period
+IN_STEP = 0.9
+# share of the period before a reference's timestamp within which an effort counts as recorded with it
+TAKEN_TOGETHER_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class HeldReference:
-    """A reference (n,) on straight lines between its stamps, and its period [s]."""
+    """A reference (n,), linear between its timestamps, and its period [s]."""
 
     between: Array
     period: float
 
     def moved(self, time: Array, lead: float) -> Array:
-        """By how much the reference at `time` (n,) [s] is more where it is later by the lead."""
+        """Change of the reference at `time` (n,) [s] if it is later by the lead."""
         return np.interp(time - lead, time, self.between) - self.between
 
 
 def held_reference(effort: Channel, reference: Channel, grid: Array) -> HeldReference | None:
-    """The reference at the times of a grid (n,), none where efforts are not taken in step with it."""
+    """The reference at the times of a grid (n,); None where efforts are not recorded in step with it."""
     last = (
         np.searchsorted(reference.time, effort.time + TAKEN_TOGETHER_SHARE * reference.period, side="right")
         - 1
@@ -46,7 +48,7 @@ def held_reference(effort: Channel, reference: Channel, grid: Array) -> HeldRefe
 
 
 def told_of(leads: Mapping[str, float]) -> Iterator[str]:
-    """What is to be known of efforts that were changed by these leads [s]."""
+    """Messages about efforts that were corrected by these leads [s]."""
     if leads:
         most = 1e3 * max(leads.values(), key=abs)
         where = "ahead of" if most > 0.0 else "behind"

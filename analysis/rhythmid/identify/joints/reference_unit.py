@@ -1,4 +1,5 @@
-"""References in another unit than the positions that follow them: told by the size of both motions, without any model of the body."""
+"""References in another unit than the positions that follow them: detected by the sizes of both motions, without a
+body model."""
 
 from collections.abc import Sequence
 
@@ -8,16 +9,17 @@ from rhythmid.identify.channel_change import DEGREE, NAMED
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Record
 
-FOLLOWS = 0.7  # correlation of reference and position, from which a joint follows its reference
+FOLLOWS = 0.7  # correlation of reference and position above which a joint follows its reference
 FACTORS = {True: (DEGREE, "degrees are of radians"), False: (1e-3, "millimetres are of metres")}
 
 
 def reference_mend(record: JointRecord, rotational: Sequence[bool]) -> str | None:
-    """What of the references seems to be declared in another unit, and what to write, in one line; None where they are as the positions.
+    """References that seem to be in another unit, and the text to write, in one line; None where they agree with
+    the positions.
 
     Parameters
     ----------
-    rotational : of each joint of the record, whether it turns.
+    rotational : for each joint of the record, whether it is rotational.
     """
     for (joint, one), turns in zip(record.joints.items(), rotational, strict=True):
         factor, unit = FACTORS[turns]
@@ -35,7 +37,8 @@ def reference_mend(record: JointRecord, rotational: Sequence[bool]) -> str | Non
 
 
 def _ratio(record: Record) -> float | None:
-    """Size of the reference's motion over that of the position; None where there is none that the position follows."""
+    """Size of the reference's motion relative to that of the position; None where the position does not follow a
+    reference."""
     given = record.reference or (record.input if record.input_kind == "reference" else None)
     if given is None:
         return None

@@ -1,10 +1,10 @@
-"""Which parameter of a model is the period of a clock of its own, as the elements say."""
+"""Finds the parameter of a model that is the period of an independent clock, as its element declares."""
 
 from rhythmid.model import Model
 
 
 def clock_of(model: Model) -> str | None:
-    """Name of the first parameter, as "label.parameter", that is a clock's period; None where the model has none."""
+    """Name of the first parameter that is a clock's period, as "label.parameter"; None where the model has none."""
     for term in model.terms:
         if term.element.clock:
             return f"{term.label}.{term.element.clock}"

@@ -1,12 +1,12 @@
-"""The likelihood of the ticks of a drive's own clock: its period and the delay before it.
+"""Likelihood of the clock ticks of a drive: the clock's period and the delay before it.
 
-A command that is held from stamp to stamp waits for the drive's tick. Wherever a tick passes a stamp another command is held, and
-the likelihood of period and delay jumps: between two jumps, which are nanoseconds of the period apart, its slope says nothing
-about its course over many, and neither do descents. So both are moved together on a grid around the fit that gets finer, all
-else following linearly.
+A command that is held between timestamps waits for the drive's next tick. Wherever a tick passes a timestamp,
+another command is held, and the likelihood of period and delay jumps. The jumps are nanoseconds of the period
+apart, so the slope between two jumps is no guide over many of them, and a descent fails. So period and delay are
+varied together on a grid around the fit, which is refined step by step. All other parameters follow linearly.
 
-A hold of nearly the right period explains most of what the right one does. The scan for it, which began under a noise that was
-coloured by all of the effect, is made again under the noise that is left.
+A hold of nearly the right period explains most of the effect. The first scan uses a noise model that contains the
+whole unexplained effect. It is therefore repeated with the noise model of the remaining residual.
 """
 
 from collections.abc import Sequence
@@ -26,24 +26,27 @@ from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 STEPS = np.linspace(-1.0, 1.0, 9)
-WIDE, FINE = 0.2, 1e-4  # reach of the grid at first and in the end: periods by which the last tick moves
+WIDE, FINE = 0.2, 1e-4  # range of the grid at first and at the end: shift of the last tick in periods
 SHIFTS = np.linspace(-1.0, 1.0, 7)
-LEAST_MOVE = 0.25  # of a sample, by which the delay is moved at least while ticks move by more than a sample
-FINER = 0.4  # of a grid's reach is that of the next
-FOLLOWED = 4  # cases whose surroundings are looked at more finely
-SCANS = 3  # at most, each under the noise that the one before has left
-NOTHING_NEW = 0.98  # of chi2, above which a scan has found nothing new
+LEAST_MOVE = 0.25  # sample periods: least shift of the delay while ticks move by more than a sample
+FINER = 0.4  # ratio of successive grid ranges
+FOLLOWED = 4  # cases that are refined further
+SCANS = 3  # largest number of scans, each with the noise model of the one before
+NOTHING_NEW = 0.98  # ratio of chi2 above which a scan brings no improvement
 
 
 def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None) -> Fit:
-    """The fit of a model with a clock of its own where the ticks are likeliest that are found under the noise that it leaves, of at
-    least `floor` [unit of the measurement]; under that noise, unless it is the fit as it was."""
+    """The fit of a model with an independent clock, with the most likely ticks found under its residual noise model.
+
+    The noise model is at least `floor` [unit of the measurement]; the fit is returned under it, unless the fit is
+    unchanged.
+    """
     period = clock_of(fit.model)
     if period is None or period not in fit.names:
         return fit
     series, places = fit.run.series, places_of(fit)
     for _ in range(SCANS):
-        if time_is_up() or fit.model.value(period) == 0.0:  # a period of nothing has no ticks
+        if time_is_up() or fit.model.value(period) == 0.0:  # a zero period has no ticks
             break
         noise = noise_of(fit.residuals, series, floor)
         try:
@@ -65,7 +68,7 @@ def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None)
 
 
 def places_of(fit: Fit) -> list[int]:
-    """Where period and input delay stand among the free parameters."""
+    """Indices of period and input delay among the free parameters."""
     return [fit.names.index(name) for name in (clock_of(fit.model), INPUT_DELAY) if name in fit.names]
 
 
@@ -76,7 +79,7 @@ def moved_to(fit: Fit, places: Sequence[int], case: Array) -> Model:
 def tried(
     fit: Fit, places: Sequence[int], guesses: Sequence[dict[str, float]], pool: ThreadPoolExecutor | None
 ) -> tuple[Array, Array]:
-    """Cases (n, 1 or 2) of the period and the delay, around the fit's and the guesses, with the chi2 (n,) that they leave."""
+    """Cases (n, 1 or 2) of the period and the delay, around the fit and the guesses, with their chi2 (n,)."""
     cases = np.array([fit.values[places], *([one[fit.names[place]] for place in places] for one in guesses)])
     costs = _costs(fit, places, cases, pool)
     longest = max(one.time[-1] - one.time[0] for one in fit.run.series)
@@ -95,8 +98,9 @@ def tried(
 def _grid(period: float, longest: float, sample: float, reach: float, late: float) -> Array:
     """Changes (n, 2) of period and delay [s] that move the last tick by up to `reach` periods.
 
-    While ticks move by more than a sample, the mean delay counts, of which half a period is the hold's. Below that it is which
-    command a tick finds: a delay that moves as much as the ticks in the middle of the record leaves it that.
+    While ticks move by more than a sample, the mean delay matters, of which half a period is due to the hold. On a
+    finer grid it matters which command a tick takes. A delay that moves like the ticks in the middle of the record
+    leaves this unchanged.
     """
     steps = reach * period**2 / longest * STEPS
     if reach * period > sample:
@@ -106,7 +110,7 @@ def _grid(period: float, longest: float, sample: float, reach: float, late: floa
 
 
 def _costs(fit: Fit, places: Sequence[int], cases: Array, pool: ThreadPoolExecutor | None) -> Array:
-    """Chi2 of the cases, with all else that was fitted following linearly; infinite where the model diverges."""
+    """Chi2 (n,) of the cases with all other fitted parameters following linearly; infinite where the model diverges."""
     others, _ = np.linalg.qr(_scaled(np.delete(fit.linearisation.jacobian, places, axis=1)))
     outputs = fit.run.many([(moved_to(fit, places, case), fit.starts) for case in cases], pool)
     costs = np.full(len(cases), np.inf)
@@ -118,7 +122,7 @@ def _costs(fit: Fit, places: Sequence[int], cases: Array, pool: ThreadPoolExecut
 
 
 def white_residual(fit: Fit, residuals: Sequence[Array]) -> Array:
-    """Residuals as the likelihood sees them, without what initial states can do."""
+    """Whitened residuals, with the effect of initial states projected out."""
     problem = Problem(fit.run, fit.names, fit.noise, None)
     white = [problem.whitened(index, residual) for index, residual in enumerate(residuals)]
     return np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])

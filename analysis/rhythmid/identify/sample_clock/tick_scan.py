@@ -1,13 +1,14 @@
-"""Scan for the period of a drive's own clock: a parameter whose best value is too narrow for any descent to find.
+"""Scan for the period of a drive's clock: the likelihood has a peak that is too narrow for a descent to find.
 
-After a time T an error dP of the period P has moved the ticks by T dP / P; once that is half a period the likelihood has
-forgotten their phase. What a hold does to the size of the response it still knows, and that tells the rate 1/P roughly: a
-coarse scan leaves a band of rates. Slow rates join it in any case, for their images of the command lie where the machine
-answers, and ticks of the wrong phase hide the right rate there. The rates are tried on a grid of 1 / (4 T), over a first
-stretch where the whole record asks for too many, and the best of them, different ones, followed while the grid gets finer,
-until the last tick of the record is known to a small share of a sample. The mean delay, of which half a period is the
-hold's, is kept at first, and shifted a little with the rate in the end: it decides which command a tick finds. What small
-changes of the other parameters and of the initial states do is projected off each residual.
+An error dP of the period P moves the ticks by T dP / P after a time T. Beyond half a period the likelihood no
+longer depends on their phase. It still depends on the attenuation by the hold, which gives the rate 1/P
+approximately. A coarse scan therefore selects a band of rates. Slow rates are always added to it: their images of
+the command lie where the machine responds, and ticks of the wrong phase hide the right rate there. The rates are
+tried on a grid of 1 / (4 T), over a first stretch if the whole record needs too many. The best distinct rates are
+followed on finer and finer grids, until the last tick of the record is known to a small share of a sample. The mean
+delay, of which half a period is due to the hold, is fixed at first. At the end it is shifted a little with the
+rate, because it decides which command a tick takes. The effect of small changes of the other parameters and of the
+initial states is projected off each residual.
 """
 
 from collections.abc import Sequence
@@ -29,18 +30,18 @@ from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 COARSE = 50  # rates of the coarse scan
-# of the way from the best to the middling cost of the coarse scan, up to which a rate is in the band
+# fraction of the way from the best to the median cost of the coarse scan, below which a rate is in the band
 BAND = 0.5
-SLOW = 2.5  # times the slowest rate, up to which rates join the band
+SLOW = 2.5  # multiple of the slowest rate up to which rates are added to the band
 MOST_RATES = 3000  # rates tried over the first stretch
-SERIES = 2  # looked at, those with the strongest command at first
-SLOWEST = 2.0  # times the dominant frequency of the motion
-FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks do not matter
-FOLLOWED, LEAST = 24, 6  # rates that are followed at first and in the end
-APART = 0.25  # over the length looked at, within which two rates are one
-FOUND = 2  # guesses returned
-FINEST = 0.001  # reach of the grid at the end, over the inverse length of the record
-FINER = 0.4  # of a grid's reach is that of the next, two of its steps: as rough as the cost is over a step
+SERIES = 2  # series used at first: those with the strongest command
+SLOWEST = 2.0  # slowest rate as a multiple of the motion's dominant frequency
+FASTEST = 100.0  # [Hz] above this rate a hold acts like a delay, and its ticks do not matter
+FOLLOWED, LEAST = 24, 6  # number of rates followed at first and at the end
+APART = 0.25  # least difference of two rates, times the length of the stretch
+FOUND = 2  # number of guesses returned
+FINEST = 0.001  # range of the last grid, over the inverse length of the record
+FINER = 0.4  # ratio of successive grid ranges, two grid steps: the cost is rough over one step
 STEPS = np.linspace(-1.0, 1.0, 11)
 SHIFTS = np.linspace(-1.0, 1.0, 5)
 
@@ -48,7 +49,8 @@ SHIFTS = np.linspace(-1.0, 1.0, 5)
 def scanned(
     model: Model, series: Sequence[Series], starts: Sequence[Array], noise: NoiseModel
 ) -> list[dict[str, float]]:
-    """First guesses of period and delay [s] of a model with a clock of its own, best first; empty where no rate is possible.
+    """First guesses of period and delay [s] of a model with an independent clock, best first; empty where no rate
+    is possible.
 
     `starts` are the initial states of the series; the other parameters stay at the model's values.
     """
@@ -72,7 +74,7 @@ def scanned(
     def best_of(length: float, cases: Array, middle: Array) -> tuple[Array, Array]:
         """The cases (n, 2) of rate and shift, best first, with their costs over stretches of this length."""
         stretches = [split(one, length)[0] for one in chosen]
-        run = prepare_run(model, stretches)  # in long steps, whose errors all cases share
+        run = prepare_run(model, stretches)  # long steps: all cases share their error
         costs = _costs(run, model.with_values(guess(*middle)), [guess(*case) for case in cases], begin, noise)
         order = np.argsort(costs)
         return cases[order], costs[order]
@@ -128,7 +130,7 @@ def _costs(
     starts: Sequence[Array],
     noise: NoiseModel,
 ) -> Array:
-    """Whitened sums of squares that the guesses leave, beyond what the model's other parameters can do at `middle`."""
+    """Whitened sums of squares of the guesses, less what the model's other parameters can explain at `middle`."""
     names = tuple(name for name in middle.free if name != clock_of(middle))
     try:
         linearisation = minimise(middle, run, names, noise, starts, iterations=0).linearisation
