@@ -13,9 +13,7 @@ from rhythmid.batch.scatter import Slope, groups_agree, holm, homogeneous, rando
 from rhythmid.batch.task import Task
 from rhythmid.report.quantity import pretty_name
 
-LEVEL = (
-    0.05  # probability that any parameter of a batch is reported to differ although there is only the stated noise
-)
+LEVEL = 0.05  # probability that any parameter of a batch is reported to differ although there is only the stated noise
 UNITS = (
     (86400.0, "day"),
     (3600.0, "h"),

@@ -31,9 +31,7 @@ from .watch_parameters import PARAMETERS as WATCHED
 from .watch_parameters import limits
 
 _FAR = math.inf
-_INSIST = (
-    0.5  # seconds for which zero is sent after the end of a command, because best-effort drives may miss a message
-)
+_INSIST = 0.5  # seconds for which zero is sent after the end of a command, because best-effort drives may miss a message
 PARAMETERS = (
     RATE,
     TIME_MODE,

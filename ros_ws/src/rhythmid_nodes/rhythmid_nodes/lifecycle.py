@@ -39,9 +39,7 @@ class FadingTransitions:
         self._make, self._answer = service.callback, service.send_response
         service.callback, service.send_response = self._on_request, self._respond
         self._request: ChangeState.Request | None = None
-        self._held: tuple[ChangeState.Response, Any] | None = (
-            None  # the waiting answer, and its recipient
-        )
+        self._held: tuple[ChangeState.Response, Any] | None = None  # the waiting answer, and its recipient
         self._timer = node.create_timer(_LOOK_PERIOD, self._look)
         self._timer.cancel()
 

@@ -32,7 +32,9 @@ from .parameters import Parameter, declare
 
 _PR_SET_PDEATHSIG = 1
 _LAST_WORDS = 0.1  # seconds
-_NAMING = 2.0  # seconds that a tripped node waits for the name of a foreign node, which arrives after its messages
+_NAMING = (
+    2.0  # seconds that a tripped node waits for the name of a foreign node, which arrives after its messages
+)
 
 RATE = Parameter("rate", 1000, "samples per second of the common grid", "Hz", (1, 100_000))
 TIME_MODE = Parameter(
