@@ -1,11 +1,11 @@
-"""Cost and memory of a batch, and its false alarms where there is nothing but noise.
+"""Cost and memory of a batch, and its false alarms if there is only noise.
 
 python benchmarks/batch.py [RUNS [JOBS [FOLDER]]]
 
-RUNS recordings of ten seconds of one machine, of two rigs by turns, are identified in four stages into one folder: a quarter of them, then
-as many more, so that a stage answers only what is new. Printed are the processor time of an answer, the largest memory of this process
+RUNS recordings of ten seconds of one machine, alternately from two rigs, are identified in four stages into one folder. Each stage adds a
+quarter of them, so that only new recordings are analysed. Printed are the processor time of an answer, the largest memory of this process
 and of a worker after each stage; then the p-value of every test, and the share of sets of eight runs in which a test is below 0.05. An
-interrupted benchmark goes on in its FOLDER.
+interrupted benchmark continues in its FOLDER.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from rhythmid.parallel import cores
 from rhythmid.report.page import render
 
 STAGES = 4
-SET = 8  # runs of a set that is tested by itself
+SET = 8  # runs of a set that is tested separately
 MEGABYTE = 1e6
 
 
@@ -40,7 +40,7 @@ def processor_time() -> float:
 
 
 def kept(folder: Path) -> int:
-    """Answers that are there."""
+    """Existing answers."""
     return len(list((folder / "out").glob("answers/*.json")))
 
 

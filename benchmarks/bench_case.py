@@ -1,4 +1,4 @@
-"""One case of the bench of recordings: which records are diagnosed with which nominal model, and what is known of the answer."""
+"""One case of the bench of recordings: the records, the nominal model, and the accepted answer."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ class Case:
     ----------
     name : short, unique, its set first: `pendulum clean`.
     nominal : the nominal model in a few words.
-    train, holdout : signals.yaml files; without `holdout` the diagnosis keeps the last fifth of every record.
+    train, holdout : signals.yaml files; without `holdout` the diagnosis holds out the last fifth of every record.
     model : the nominal model's file.
-    first : any of these elements is right as the dominant effect; empty where nothing is missing, None where no answer is accepted.
+    first : elements of which any is right as the dominant effect; empty if nothing is missing, None if there is no accepted answer.
     truth : parameters that are known, `element.parameter` -> value in the model's units, which the bench compares.
     """
 

@@ -1,4 +1,4 @@
-"""Bursts through the delay injector: as many messages as can be published at once, again and again. No burst may stop it.
+"""Repeated bursts through the delay injector, as many messages as can be published at once. No burst may stop it.
 
 python benchmarks/bursts.py [BURSTS [MESSAGES]]
 """
@@ -43,7 +43,7 @@ class Bursts(Node):
             self._executor.spin_once(timeout_sec=0.05)
 
     def burst(self, messages: int) -> int:
-        """Publish a burst; how many of it came through."""
+        """Publish a burst; returns the number of messages that came through."""
         before, begun = self.heard, time.monotonic()
         for number in range(messages):
             self._publisher.publish(self._write(time.time_ns(), float(number)))

@@ -1,7 +1,7 @@
-"""Simulated machines as the world has them, for the bench: one effect that the nominal model lacks, with three small ones beside it.
+"""Simulated machines for the bench: one effect that the nominal model lacks, with three small ones beside it.
 
-Every machine is a few lines of its own, run by a fourth-order Runge-Kutta scheme with a fixed step; no line is shared with rhythmid's
-simulator. Friction turns over 1 mm/s or 1 mrad/s; logs have jittered stamps and noise.
+Every machine has its own few lines of code, integrated by a fourth-order Runge-Kutta scheme with a fixed step, without code of rhythmid's
+simulator. Friction changes sign over 1 mm/s or 1 mrad/s; logs have jittered stamps and noise.
 """
 
 import math
@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from bench_case import COULOMB_FAMILY, LAGS, Array, Case, write_model, write_signals, write_table
 
-STEP = 4e-4  # s; friction turns within TURN at up to 4000 1/s, which the scheme bears up to 7000 1/s at this step
-TURN = 1e-3  # m/s or rad/s, over which friction turns
+STEP = 4e-4  # s; friction changes sign within TURN at up to 4000 1/s; at this step the scheme is stable up to 7000 1/s
+TURN = 1e-3  # m/s or rad/s, range in which friction changes sign
 POSITION_NOISE = 2e-5  # m or rad, standard deviation
 JITTER = 0.05  # standard deviation of a stamp, in sample periods
 RATE = 500.0  # Hz, of the logs
@@ -168,7 +168,7 @@ def servo(seed: int) -> tuple[dict[str, Array], dict[str, float]]:
 
 
 def hopper(seed: int) -> tuple[dict[str, Array], dict[str, float]]:
-    """A mass on a leg that leaves the ground never, driven by a force through a lag of 15 ms; clutter: drag, Coulomb, a stiffening."""
+    """A mass on a leg that never leaves the ground, driven by a force through a lag of 15 ms; clutter: drag, Coulomb friction, a hardening spring."""
     force = multisine(seed, 1.2, (0.5, 6.0))
 
     def slope(t: float, s: list[float]) -> list[float]:
@@ -239,11 +239,11 @@ MACHINES: tuple[tuple[str, str, Simulated, str, tuple[str, str], float, frozense
     ("servo", "inertia, controller", servo, SERVO, ("input: {column: reference, unit: rad, kind: reference, hold: linear}", ANGLE), RATE, LAGS, {}),
     ("hopper", "mass, spring, damper", hopper, HOPPER, ("input: {column: u, hold: linear}", "output: {column: x}"), RATE, LAGS, {}),
 )  # fmt: skip
-SEEDS, HELD_OUT = (1, 2), 3  # of records to learn from and of the one held out
+SEEDS, HELD_OUT = (1, 2), 3  # of the records for the fit and of the held-out one
 
 
 def cluttered_cases(folder: Path, wanted: Callable[[str], bool] = lambda _: True) -> list[Case]:
-    """The simulated machines whose names are `wanted` as cases, their logs written to `folder`: two records to learn from and one
+    """The simulated machines whose names are `wanted` as cases, their logs written to `folder`: two records for the fit and one
     held out."""
     cases: list[Case] = []
     for machine, nominal, simulated, text, channels, rate, first, truth in MACHINES:

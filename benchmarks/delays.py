@@ -5,14 +5,14 @@
 The record is the paper's experiment (nine chirps of 30 s behind a warm-up, delays of 40 and 50 ms), without noise and with noise
 of 5 and 20 µm. Contenders:
 
-- joint: rhythmid's default, joint maximum likelihood, from values that are off;
-- paper: the paper's two steps, delays from G_-1 alone;
+- joint: rhythmid's default, joint maximum likelihood, from wrong initial values;
+- paper: the paper's two steps, delays from G_-1 only;
 - correlation: scipy.signal.correlate of the measured response with that of the true machine without delays, its peak
-  interpolated by a parabola; it is given the true stiffness and damping, and can show the sum of the delays only;
+  interpolated by a parabola; it is given the true stiffness and damping, and gives only the sum of the delays;
 - phase slope: a straight line through the phase of the cross-spectrum of the same two; the sum only;
 - grey box: scipy.optimize.least_squares on scipy.integrate.solve_ivp, all parameters, delays and the initial state free, from
-  stiffness and damping 5 % off and delays 10 ms off. It is slow, so it sees a stretch of `--grey-box` seconds only, and
-  each noise once; 0 leaves it out.
+  initial values with errors of 5 % in stiffness and damping and 10 ms in the delays. It is slow, so it uses only `--grey-box` seconds,
+  and each noise once; 0 leaves it out.
 """
 
 import argparse
@@ -41,10 +41,10 @@ Array = NDArray[np.float64]
 DELAYS = (0.04, 0.05)
 NOISE = (0.0, 5e-6, 2e-5)
 BAND = (0.5, 5.0)  # Hz, of the phase slope
-COARSE = 0.08  # s, a guess of the sum that keeps the phase slope's phases from wrapping
+COARSE = 0.08  # s, a guess of the sum that avoids phase wrapping
 Estimator = Callable[
     [Record], tuple[float, float, float]
-]  # input delay, measurement delay (NaN where unseen), sum [s]
+]  # input delay, measurement delay (NaN if not estimated), sum [s]
 
 
 def record_of(delays: tuple[float, float]) -> Record:

@@ -1,13 +1,13 @@
-"""Monte Carlo of the joint estimator on the paper's experiment: scatter against the bound, coverage of intervals, and starts
-that are far off.
+"""Monte Carlo of the joint estimator on the paper's experiment: scatter relative to the bound, coverage of intervals, and distant
+initial values.
 
     python benchmarks/delays_monte_carlo.py                    # everything, on two chirps: a few minutes
     python benchmarks/delays_monte_carlo.py --chirps 9 --only scatter     # the paper's nine chirps
     python benchmarks/delays_monte_carlo.py --only scatter --case 1 --runs 1000     # of the four, the second
     python benchmarks/delays_monte_carlo.py --only starts --runs 200
 
-One record is simulated; every run adds white noise of its own and fits from values that are a little off. A start that
-is far off has delays of its own, so each has its own record.
+One record is simulated. Every run adds its own white noise and fits from slightly wrong initial values. Each run with distant
+initial values has its own delays, and therefore its own record.
 """
 
 import argparse
@@ -97,7 +97,7 @@ class Start:
 
 
 def print_starts(runs: int, chirps: int, workers: int | None) -> None:
-    """How many random starts reach the truth (within five standard deviations of each parameter)."""
+    """How many random starts reach the true values (within five standard deviations of each parameter)."""
     rng = np.random.default_rng(1)
     cases = [
         Start(tuple(rng.uniform(0.0, 0.3, 2).round(5)), rng.uniform(0.5, 1.5, 2), rng.uniform(0.0, 0.3, 2))

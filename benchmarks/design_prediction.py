@@ -1,10 +1,10 @@
-"""Monte Carlo of designs: the scatter of what `rhythmid identify` finds over what `rhythmid design` predicted.
+"""Monte Carlo of designs: the scatter of the estimates of `rhythmid identify` divided by the prediction of `rhythmid design`.
 
     python benchmarks/design_prediction.py --runs 200                      # the paper's hopper, 270 s, both kinds
     python benchmarks/design_prediction.py --runs 200 --duration 60 --rate 500 --noise 2e-5 --max-effort 0.05
 
-Each design is written to a folder, its experiment simulated once from there, and every run adds noise of its own and
-identifies with the joint likelihood, from values that are off.
+Each design is written to a folder, and its experiment is simulated once from there. Every run adds its own noise and
+identifies with the joint likelihood, from wrong initial values.
 """
 
 import argparse

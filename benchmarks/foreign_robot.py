@@ -1,13 +1,13 @@
-"""A robot of another make, over real topics: MuJoCo moves it, an effect is concealed in it, and the diagnosis names it.
+"""A foreign robot over real topics: MuJoCo simulates it, an effect is concealed in it, and the diagnosis names the effect.
 
     python benchmarks/foreign_robot.py record BAG [friction:=1.5 ...]            # plays and records, 20 s in real time
     rhythmid diagnose BAG --signals tests/robots/signals.yaml --model tests/robots/nominal.yaml
 
     python benchmarks/foreign_robot.py campaign --effect nothing --runs 20       # how often the verdict is right
 
-The robot is tests/robots/mujoco_lift.py, and its parameters are what can be concealed. The campaign prints each verdict, and
-whether the true values lie in the 95 % intervals. The true delay is counted from the time at which a command was recorded to
-the one at which the robot says that it acted.
+The robot is tests/robots/mujoco_lift.py; its parameters can be concealed. The campaign prints each verdict, and
+whether the true values are within the 95 % intervals. The true delay is the time from the recording of a command to
+its action, as reported by the robot.
 """
 
 from __future__ import annotations
@@ -35,9 +35,7 @@ from rhythmid.record.signals import Signals
 from rhythmid.statistics import NORMAL_95
 
 ROBOT = Path(__file__).parents[1] / "tests" / "robots"
-READY_WITHIN = (
-    180.0  # seconds until all have started and found one another on a busy machine, beside the record
-)
+READY_WITHIN = 180.0  # seconds for start and discovery on a busy computer, in addition to the record
 
 
 @dataclass(frozen=True)
@@ -140,7 +138,7 @@ def answer(bag: Path, command_type: str = "Float64MultiArray") -> dict[str, Any]
 
 
 def signals(command_type: str) -> Signals:
-    """Which channel is what, with commands of this type."""
+    """The signals file for commands of this type."""
     text = (ROBOT / "signals.yaml").read_text(encoding="utf-8")
     field = {"Float64MultiArray": "data[1]", "Float64": "data", "JointState": "effort[lift]"}[command_type]
     return Signals.from_text(text.replace("data[1]", field))
@@ -156,7 +154,7 @@ def true_delay(bag: Path, acted: np.ndarray) -> float:
 
 
 def judge(effect: Effect, found: Mapping[str, Any], delay: float, sigmas: float) -> list[str]:
-    """What is wrong with an answer, one phrase each; empty for a right one. Values may be off by so many standard deviations."""
+    """Errors of an answer, one phrase each; empty for a right answer. Values may differ by so many standard deviations."""
     wanted = "missing_physics" if effect.names else "consistent"
     wrong = [] if found["verdict"] == wanted else [f"verdict {found['verdict']} instead of {wanted}"]
     named = {one["element"]: one["parameters"] for one in found["missing"]}

@@ -1,11 +1,11 @@
-"""A fuzzing campaign over everything that reads files of others: refused in one line, or accepted; nothing else may happen.
+"""A fuzzing campaign over all readers of untrusted files: an input is refused in one line, or accepted; nothing else may happen.
 
 python benchmarks/fuzz.py [--target NAME …] [--count N] [--seconds S] [--seed N] [--log FILE] [--replay TARGET:NUMBER]
 
-Valid inputs of each target are spoilt (mutation.py, fuzz_targets.py) and read in a process of their own, which is watched from
-outside. Failures are: any exception but an InputError of one short line, a warning of numpy's, a death by a signal, more time or
+Valid inputs of each target are corrupted (mutation.py, fuzz_targets.py) and read in a separate process, which is monitored from
+outside. Failures are: any exception except an InputError of one short line, a NumPy warning, an end by a signal, more time or
 memory than TIME_LIMIT and MEMORY_LIMIT, and anything written outside the input's own folder, started or unpickled. Input number k
-of a target is the same whenever the seed is; with --log a later call goes on where the last one ended. Exit code 1 where anything
+of a target is the same for the same seed. With --log a later call continues where the last one ended. Exit code 1 if anything
 failed.
 """
 
@@ -35,18 +35,16 @@ from rhythmid.errors import InputError
 from rhythmid.units import Units
 
 TIME_LIMIT = 5.0  # s of the processor for one input, of which none is larger than some kB
-PATIENCE = 60.0  # s by the clock: the machine may be busy with other things
+PATIENCE = 60.0  # s of wall-clock time: the computer may be busy
 MEMORY_LIMIT = 512  # MiB that one input may take
-ADDRESS_SPACE = (
-    8 << 30
-)  # bytes, beyond which the process gets no memory: this machine has to survive its findings
-WARM_UP = 6  # valid inputs that are read before
+ADDRESS_SPACE = 8 << 30  # bytes, beyond which the process gets no memory, to protect this computer
+WARM_UP = 6  # valid inputs that are read first
 KNOWN_UNIT, UNKNOWN_UNIT = (
     "mm",
     "furlings",
 )  # neither is the machine's: the first is converted for the message
 BATCH = 1000  # inputs that one process reads
-LONGEST_LINE = 1500  # characters of a refusal that still is one clear line
+LONGEST_LINE = 1500  # characters of an error message that is still one clear line
 KEPT = 20  # failures of one kind that are listed by number
 FORBIDDEN = (
     "os.system",
@@ -60,7 +58,7 @@ FORBIDDEN = (
 
 @dataclass
 class Tally:
-    """What became of a target's inputs."""
+    """Outcomes of a target's inputs."""
 
     inputs: int = 0
     refused: int = 0
@@ -88,7 +86,7 @@ class Tally:
 
 
 class Watch:
-    """Notes what a reader does besides reading. An audit hook cannot be taken off, so there is one, switched on and off."""
+    """Notes what a reader does besides reading. An audit hook cannot be removed, so there is one that is switched on and off."""
 
     def __init__(self) -> None:
         self.folder = ""
@@ -121,7 +119,7 @@ class Watch:
 def attempt(
     target: Target, data: bytes, folder: Path, number: int, watch: Watch | None = None
 ) -> tuple[str, str]:
-    """What becomes of an input: ("accepted" or "refused" or "failed", and how it failed)."""
+    """Outcome of an input: ("accepted" or "refused" or "failed", and how it failed)."""
     try:
         if watch is None:
             target.use(data, folder, number)
@@ -144,7 +142,7 @@ def attempt(
 
 
 def _where(error: BaseException) -> str:
-    """An exception's type and the last line of ours that it passed."""
+    """An exception's type and the last line of rhythmid's code that it passed."""
     frames = traceback.extract_tb(error.__traceback__)
     ours = [frame for frame in frames if "/rhythmid/" in frame.filename] or frames
     return f"{type(error).__name__} at {Path(ours[-1].filename).name}:{ours[-1].lineno}"
@@ -233,7 +231,7 @@ def watched(
 
 
 def load_units() -> None:
-    """Load the registry of units, as the first foreign unit does: a library behind it reads a pickle of its own while it is loaded."""
+    """Load the registry of units, as the first foreign unit does, because a library reads its own pickle while it is loaded."""
     for unit in (KNOWN_UNIT, UNKNOWN_UNIT):
         with suppress(InputError):
             Units().check(unit, "m", "warm-up")
@@ -242,7 +240,7 @@ def load_units() -> None:
 def campaign(target: Target, seed: int, first: int, count: int, until: float, scratch: Path) -> Tally:
     """At most `count` inputs from number `first` on, until the clock reads `until`."""
     load_units()
-    for spare in range(WARM_UP):  # what is loaded and compiled once is no input's time or memory
+    for spare in range(WARM_UP):  # loading and compiling once does not count as an input's time or memory
         (folder := scratch / f"warm{spare}").mkdir(exist_ok=True)
         with suppress(Exception):
             target.use(random.Random(spare).choice(target.valid()), folder, spare)
@@ -255,7 +253,7 @@ def campaign(target: Target, seed: int, first: int, count: int, until: float, sc
 
 
 def table(tallies: dict[str, Tally]) -> str:
-    """One line a target, and the failures by kind."""
+    """One line per target, and the failures by kind."""
     lines = [
         f"{'target':12}{'inputs':>9}{'refused':>9}{'accepted':>9}{'crashes':>9}{'worst s':>9}{'peak MiB':>9}"
     ]

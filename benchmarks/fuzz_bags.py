@@ -1,4 +1,4 @@
-"""Bags, messages and their definitions: valid, spoilt, and read."""
+"""Bags, messages and their definitions: valid, corrupted, and read."""
 
 import io
 import random
@@ -78,7 +78,7 @@ def mcaps() -> list[bytes]:
 
 
 def spoil_mcap(rng: random.Random, valid: bytes) -> bytes:
-    """Bytes anywhere, or the length of a record, which stands behind its kind."""
+    """Change bytes anywhere, or the length of a record, which follows its kind."""
     if rng.random() < 0.7:
         return spoil_bytes(rng, valid)
     places = list(_records(valid))
@@ -213,7 +213,7 @@ def messages() -> list[bytes]:
 
 
 def use_message(data: bytes, folder: Path, number: int) -> None:
-    """The spoilt message among whole ones, by layout and one by one: what both accept has to be equal."""
+    """The corrupted message among intact ones, read by layout and one by one: both have to accept the same."""
     whole = messages()
     topic, good = (TOPIC, whole[0]) if abs(len(data) - len(whole[0])) < abs(len(data) - len(whole[1])) else (
         OWN_TOPIC, whole[1]

@@ -1,4 +1,4 @@
-"""Tables in text, JSON, NumPy, MATLAB and Parquet: valid, spoilt, and read."""
+"""Tables in text, JSON, NumPy, MATLAB and Parquet: valid, corrupted, and read."""
 
 import gzip
 import io
@@ -46,7 +46,7 @@ def _arrays() -> dict[str, np.ndarray]:
 
 
 def npz_parts() -> list[bytes]:
-    """A member's bytes: it is spoilt before it is packed, since the archive's checksum would find it out."""
+    """A member's bytes, corrupted before packing, because the archive's checksum would detect it."""
     made = []
     for array in (*_arrays().values(), np.array(["a", "b"]), np.array([{"a": 1}], dtype=object)):
         file = io.BytesIO()

@@ -1,6 +1,6 @@
-"""What reads files of others: for each reader valid inputs, how they are spoilt, and the call that has to refuse or accept them.
+"""The readers of untrusted files: for each reader valid inputs, their corruption, and the call that has to refuse or accept them.
 
-A target's `use` returns when the input is accepted and raises InputError when it is refused; anything else is a failure.
+A target's `use` returns if the input is accepted and raises InputError if it is refused; anything else is a failure.
 """
 
 import random
@@ -24,13 +24,13 @@ from rhythmid.record.signals import Signals
 
 @dataclass(frozen=True)
 class Target:
-    """A reader under attack.
+    """A reader under test.
 
     Attributes
     ----------
     name : as given on the command line.
     valid : makes the valid inputs.
-    spoil : makes a hostile input of a valid one.
+    spoil : makes a hostile input from a valid one.
     use : reads it: input, an empty folder of its own, number of the input.
     """
 

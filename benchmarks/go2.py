@@ -1,10 +1,10 @@
-"""A real quadruped in the air: what is identified and named from its references and angles alone.
+"""A real quadruped in the air: identification and diagnosis from its references and angles only.
 
     python benchmarks/go2.py [--folder DIR] [--diagnose]
 
-The recording (docs/real.md) lies in $RHYTHMID_DATA, else in ../shared/data beside the checkout. Printed: the error of free runs over
-the last fifth of the recording, which no fit has seen, as a share of the motion, of each leg: of the file as it is, and as identified; the
-rotors' inertias of left and right legs; what the data do not tell apart; and with --diagnose what is missing at which joint. `--folder`
+The recording (docs/real.md) is in $RHYTHMID_DATA, else in ../shared/data beside the checkout. Printed: the error of free runs over
+the held-out last fifth of the recording, as a share of the motion of each leg, of the file as it is and as identified; the
+rotors' inertias of left and right legs; what the data do not separate; and with --diagnose what is missing at which joint. `--folder`
 keeps the files that were made.
 """
 

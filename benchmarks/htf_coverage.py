@@ -2,9 +2,9 @@
 
     python benchmarks/htf_coverage.py [--runs 200] [--noise 5e-6 2e-5]
 
-One record of the paper's hopper is simulated for each excitation, every run adds noise of its own. A point counts as
-covered where the theoretical function, delays included, lies in the disk that the estimate gives for it. How often too many
-harmonics are found is counted on records of nothing but G_0 and noise.
+One record of the paper's hopper is simulated for each excitation, and every run adds its own noise. A point counts as
+covered if the theoretical function, with delays, is within the disk of the estimate. How often too many
+harmonics are found is counted on records of G_0 and noise only.
 """
 
 import argparse
@@ -101,7 +101,7 @@ def coverage(name: str, noise: float, seeds: range, workers: int | None) -> None
 
 
 def false_alarms(runs: int) -> None:
-    """Print how often harmonics are found that are not there."""
+    """Print how often absent harmonics are found."""
     record = record_of(EXCITATIONS["nine shifted chirps, 4 mN"])
     pumping = pumping_of(record)
     assert pumping is not None

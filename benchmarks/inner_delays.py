@@ -1,13 +1,13 @@
-"""Dead times concealed inside random machines: how often the 95 % interval holds the true one, and what is said where it cannot be told.
+"""Dead times concealed inside random machines: how often the 95 % interval contains the true one, and the answer if it is not identifiable.
 
     python benchmarks/inner_delays.py [--seed 0] [--cases 50] [--only feedback_delay] [--workers 2]
 
-Three sorts of machine, each with input and measurement delays of its own: a position servo whose drive is late
-(`actuator_delay`), one whose controller sees the motion late (`feedback_delay`), both with a forcing made on the robot in every
-other case; and a forced machine without a controller whose drive is late, where only the sum with the measurement delay shows.
-Records are simulated in steps a tenth as long as those that are fitted. Printed: coverage of the dead time, or of the sum; splits
-claimed where there is none; the largest error over its standard deviation; and how the standard deviation that the bound
-predicts before the noise is drawn compares.
+Three kinds of machine, each with its own input and measurement delays: a position servo whose drive is late
+(`actuator_delay`), one whose controller gets the motion late (`feedback_delay`), both with a forcing generated on the robot in every
+other case; and a forced machine without a controller whose drive is late, where only the sum with the measurement delay is identifiable.
+Records are simulated with a tenth of the step of the fit. Printed: coverage of the dead time, or of the sum; wrong claims of
+separate delays; the largest error over its standard deviation; and the standard deviation relative to the bound that is
+computed before the noise is drawn.
 """
 
 import argparse
@@ -66,7 +66,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Error of what was told [s] with its standard deviation, None where nothing was; whether a split was claimed; the bound."""
+    """Error of the estimate [s] with its standard deviation, None without an estimate; whether separate delays were claimed; the bound."""
 
     error: float | None
     std: float
@@ -132,7 +132,7 @@ def drawn(sort: str, seed: int, index: int) -> Case:
 
 
 def examined(case: Case) -> Outcome:
-    """What identification says of the case."""
+    """The result of the identification of the case."""
     name = f"{case.label}.delay"
     truth = case.machine.value(name)
     joint = joint_likelihood(case.record, case.model)
@@ -181,7 +181,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int)
     given = parser.parse_args()
 
-    threadpool_limits(1)  # the machines are shared out among processes
+    threadpool_limits(1)  # the machines are distributed among processes
     for sort in SORTS if given.only is None else (given.only,):
         begin = time.monotonic()
         outcomes: list[Outcome] = []

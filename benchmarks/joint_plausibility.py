@@ -1,9 +1,9 @@
-"""Records of machines of several joints whose channels are declared wrongly, and records that are right of machines that their file hardly fits.
+"""Wrongly declared records of machines of several joints, and rightly declared records of machines that their file hardly fits.
 
     python benchmarks/joint_plausibility.py [--cases N] [--seed S]
 
-Every machine has links whose masses differ from the file's, and dry friction that it lacks. Right records have masses wrong by a factor of 2 (standard
-deviation), wrong ones by 1.2: of these one fault is drawn (two joints exchanged, degrees, a turned sign, amperes, at one joint or at all).
+Every machine has links with other masses than the file, and dry friction that the file lacks. In right records the masses are wrong by a factor of 2 (standard
+deviation), in wrong ones by 1.2. In the latter one fault is drawn (two joints exchanged, degrees, an opposite sign, amperes, at one joint or at all).
 """
 
 import argparse

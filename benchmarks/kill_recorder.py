@@ -1,9 +1,9 @@
-"""The recorder killed (SIGKILL) at random moments: what can be read afterwards, and how much is lost.
+"""Kills the recorder (SIGKILL) at random moments, and measures what can be read afterwards and how much is lost.
 
 python benchmarks/kill_recorder.py [TIMES [SEED]]
 
-A sender publishes numbered messages at 1 kHz all the time; what the recovered bag holds must be a run of these numbers
-without a gap and with the very bytes that were sent.
+A sender publishes numbered messages at 1 kHz all the time. The recovered bag must contain consecutive numbers
+without a gap, with exactly the bytes that were sent.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ ALLOWED = 1.5  # seconds
 
 @dataclass(frozen=True)
 class Loss:
-    """What a killed recorder left: seconds lost at the end, messages kept, whether they are what was sent."""
+    """The result of a killed recorder: seconds lost at the end, messages kept, whether they equal the sent ones."""
 
     seconds: float
     kept: int
@@ -46,7 +46,7 @@ class Loss:
 
 
 class Sender(Node):
-    """Publishes numbered messages at 1 kHz from the moment at which somebody listens."""
+    """Publishes numbered messages at 1 kHz as soon as there is a subscriber."""
 
     def __init__(self, context: Context) -> None:
         super().__init__("sender", context=context)
@@ -81,7 +81,7 @@ class Sender(Node):
 
 
 def kill(folder: Path, storage: str, after: float) -> Loss:
-    """Kill a recorder `after` so many seconds of recording, and recover its bag; everything happens in `folder`."""
+    """Kill a recorder `after` so many seconds of recording, and recover its bag, all in `folder`."""
     bag = folder / "killed"
     command = [sys.executable, "-m", "rhythmid_nodes.recorder", "--ros-args", "-p", f"path:={bag}"]
     process = subprocess.Popen([*command, "-p", f"storage:={storage}", "-p", "topics:=[joint_states]"])

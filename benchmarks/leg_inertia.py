@@ -1,6 +1,6 @@
-"""A quadruped's joint as a single one: inertia about its axis and gravity on it, the joints beyond it at given angles.
+"""A quadruped's joint as a single axis: inertia about its axis and gravity on it, with the following joints at given angles.
 
-Read from a MuJoCo XML file whose bodies hang one in another: hip (about x), thigh, calf (about y), every inertial explicit.
+Read from a MuJoCo XML file with nested bodies: hip (about x), thigh, calf (about y), every inertial explicit.
 """
 
 import math
@@ -25,7 +25,7 @@ ARMATURE = 0.01  # kg m^2, the file's default class
 
 @dataclass(frozen=True)
 class JointModel:
-    """One joint with all that hangs from it: `inertia` [kg m^2] with the rotor's; gravity's torque is
+    """One joint with all links beyond it: `inertia` [kg m^2] with the rotor's; gravity's torque is
     -moment * sin(q - reference), in N m and rad of the joint's own angle."""
 
     inertia: float

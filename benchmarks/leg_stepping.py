@@ -1,4 +1,4 @@
-"""Speed of the stepping of a leg with elements along its joints, beside MuJoCo's own loop in the same run.
+"""Speed of the simulation of a leg with elements along its joints, compared with MuJoCo's own loop in the same run.
 
     python benchmarks/leg_stepping.py [SECONDS]
 
@@ -29,7 +29,7 @@ from rhythmid.simulation.signal import spline
 
 MODELS = Path(str(files("rhythmid"))) / "models" / "legs"
 STEP = 0.001  # [s]
-REPEATS = 5  # of which the fastest counts: the machine may be shared
+REPEATS = 5  # runs, of which the fastest counts, because the computer may be shared
 
 
 def leg() -> Machine:

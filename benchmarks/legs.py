@@ -1,11 +1,11 @@
-"""Effects concealed at one joint of machines of several joints, and found again from messy logs.
+"""Effects concealed at one joint of machines of several joints, and diagnosed from untidy logs.
 
     python benchmarks/legs.py [--cases N] [--seed S] [--bodies leg,arm,quadruped] [--computed] [--json FILE]
 
 Every case draws a body, and a joint and an effect or none; the plant has the effect, the diagnosis has not. Logs have stamps that jitter by
-0.3 ms, an encoder's steps, noise of 1 % on the torque and lost messages; in half of the cases the reference is held from stamp to stamp and the
-torque is that of the instant, in the others it goes on smoothly, and nothing is told of which. With --computed no torque is recorded, but the
-references and positions only: the torque is computed from the controllers, and effects of the command path are concealed, too. Counted with Wilson's 95 % intervals: joint right
+0.3 ms, an encoder's steps, noise of 1 % on the torque and lost messages. In half of the cases the reference is held from stamp to stamp and the
+torque is sampled at the instant; in the others the reference is smooth. The diagnosis is not told which. With --computed only
+references and positions are recorded: the torque is computed from the controllers, and effects of the command path are concealed as well. Counted with Wilson's 95 % intervals: joint right
 (something is named there; marked: named, undecided or unknown), joint and effect right (the effect, one that the answer lists as
 indistinguishable from it, or one of its family), both also where the effect's share of what the refitted nominal path misses of the joint's effort, by power, is above 10 %, and joints without an
 effect at which something was named.
@@ -41,7 +41,7 @@ LASTS = {"leg": 18.0, "arm": 20.0, "quadruped": 16.0}  # [s]
 # sizes as shares of the rms of the joint's effort (N m), or of what they multiply
 EFFECTS = ("coulomb_friction", "actuator_lag", "actuator_gain", "actuator_delay", "constant_force", "linear_spring",
            "link_mass", "payload", "armature", "actuator_deadband", "stribeck_friction")  # fmt: skip
-# effects of the command path, which a recorded torque does not show
+# effects of the command path, which are not visible in a recorded torque
 COMMANDS = ("input_delay", "command_lag", "command_hold", "reference_rate_limit")
 DELAYS = ("actuator_delay", "input_delay")
 RATES = (30.0, 40.0, 50.0, 60.0)  # Hz, of drives that hold their commands: round ones, as drives have
@@ -49,7 +49,7 @@ RATES = (30.0, 40.0, 50.0, 60.0)  # Hz, of drives that hold their commands: roun
 
 @dataclass(frozen=True)
 class Case:
-    """One case and what was said of it."""
+    """One case and its answer."""
 
     number: int
     body: str
@@ -85,7 +85,7 @@ def concealed(
         name = f"{links[-1]}.mass"
         factor = 1.0 + float(rng.choice([-1.0, 1.0]) * rng.uniform(0.25, 0.5))
         return machine.with_inertial({name: factor * machine.body.parameters[name]}), factor
-    if effect == "payload":  # its place is not where the diagnosis takes the link's end to be
+    if effect == "payload":  # its place differs from the end of the link that the diagnosis assumes
         link = carried_at(machine, joint)[0]
         place = machine.body.ends[link] * float(rng.uniform(0.8, 1.2))
         size = float(rng.uniform(0.2, 0.6)) * machine.body.parameters[f"{link}.mass"]
@@ -139,9 +139,9 @@ def family(name: str) -> str:
 def share_of(
     machine: Machine, plant: Machine, joint: str, effect: str, record: JointRecord, without: JointRecord
 ) -> float:
-    """By how much of its power what the nominal path misses of the joint's effort falls where the path has the effect, both refitted.
+    """Share of the power of the nominal path's effort error that adding the effect to the path removes, both refitted.
 
-    A delay is read off no motion: there it is what the nominal path misses of a record `without` the effect.
+    A delay cannot be evaluated from the motion: there the reference is the nominal path's error on a record `without` the effect.
     """
 
     def missed(one: Machine, of: JointRecord) -> float:
@@ -163,7 +163,7 @@ def run(number: int, seed: int, bodies: Sequence[str], computed: bool = False) -
     there = {family(term.element.name) for term in machine.paths[joint].terms}
     lacking = [
         name for name in (*EFFECTS, *(COMMANDS if computed else ())) if family(name) not in there
-    ]  # what a path has, a fit takes in
+    ]  # a fit absorbs what a path already has
     if not carried_at(machine, joint):
         lacking.remove("payload")
     effect = "none" if rng.uniform() < NULLS else str(rng.choice(lacking))

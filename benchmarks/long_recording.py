@@ -1,4 +1,4 @@
-"""A long recording in a short time: what the live bag takes in memory while hours of messages go through it.
+"""A long recording in a short time: memory of the live bag while hours of messages are written.
 
 python benchmarks/long_recording.py [HOURS [RATE [SPLIT]]]
 
@@ -19,7 +19,7 @@ from rhythmid_nodes.bag import LiveBag, Storage
 from rhythmid_nodes.joint_state import JointStateWriter
 
 TOPICS = ("/excitation", "/command", "/forcing", "/joint_states")
-WAITING = 20_000  # messages in the queue at which the sender waits for the disk
+WAITING = 20_000  # messages in the queue above which the sender waits for the disk
 REPORTS = 10
 
 
@@ -30,7 +30,7 @@ def resident() -> float:
 
 
 def record(path: Path, seconds: float, rate: float, split: float) -> list[float]:
-    """Record so much simulated time; the memory [MB] after each tenth of it."""
+    """Record so much simulated time; returns the memory [MB] after each tenth of it."""
     bag = LiveBag(Storage(path, max_duration=split, by_message_time=True))
     bag.open()
     for topic in TOPICS:

@@ -5,7 +5,7 @@
 
 Simulates runs of a mass on a spring with Coulomb friction, each with a multisine of its own, and writes them as bags. Then runs
 `rhythmid identify`, with the machine's own model, and `rhythmid diagnose`, with a nominal model that lacks the friction, on the first N
-records, as processes of their own. Printed for each: the largest memory of the process and those that it starts (proportional set size,
+records, as separate processes. Printed for each: the largest memory of the process and those that it starts (proportional set size,
 so that memory which forked processes share is counted once), the time, the processor time, the exit code and the first line of
 the answer. Needs /proc.
 """
@@ -23,7 +23,7 @@ from pathlib import Path
 
 import yaml
 
-LOOK = 0.5  # s between two looks at the memory
+LOOK = 0.5  # s between two measurements of the memory
 MACHINE = """
 inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
 force:
@@ -36,7 +36,7 @@ RHYTHMID = [sys.executable, "-m", "rhythmid.cli"]
 
 @dataclass(frozen=True)
 class Used:
-    """What a command took: memory [bytes], wall clock and processor time [s], its exit code and what it printed."""
+    """Cost of a command: memory [bytes], wall-clock and processor time [s], its exit code and its output."""
 
     memory: int
     seconds: float
@@ -46,7 +46,7 @@ class Used:
 
 
 def family(root: int) -> list[int]:
-    """The process and all that descend from it."""
+    """The process and all its descendants."""
     parent: dict[int, int] = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
@@ -61,7 +61,7 @@ def family(root: int) -> list[int]:
 
 
 def memory_of(root: int) -> int:
-    """Proportional set size [bytes] of a process and all that descend from it."""
+    """Proportional set size [bytes] of a process and all its descendants."""
     total = 0
     for pid in family(root):
         try:

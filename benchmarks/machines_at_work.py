@@ -1,4 +1,4 @@
-"""Machines at work for the benchmark of the live twin: drawn about three designs, simulated stretch by stretch."""
+"""Running machines for the benchmark of the live twin: drawn about three designs, simulated piece by piece."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def drawn(name: str, rng: np.random.Generator) -> Machine:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Signals of a while: times [s], command and forcing [N], the measurement [m] with its stamps [s]; the state at the end."""
+    """Signals of a time span: times [s], command and forcing [N], the measurement [m] with its stamps [s]; the state at the end."""
 
     time: Array
     command: Array
@@ -100,7 +100,7 @@ class Stretch:
         ]
 
     def then(self, other: Stretch) -> Stretch:
-        """These and what follows, whose first sample is the last of these."""
+        """These signals and the following ones, whose first sample is the last of these."""
 
         def joined(name: str) -> Array:
             return np.concatenate([getattr(self, name)[:-1], getattr(other, name)])
@@ -116,7 +116,7 @@ class Stretch:
 
 
 class Operation:
-    """A machine at work with one excitation and one noise; the excitation repeats itself with other phases from chunk to chunk."""
+    """A running machine with one excitation and one noise; the excitation repeats with other phases from chunk to chunk."""
 
     def __init__(self, machine: Machine, seed: int) -> None:
         self.machine = machine
@@ -154,7 +154,7 @@ class Operation:
         return Stretch(time, self.command(time), forcing[first:], time + delay, run.output, run.states[-1])
 
     def run(self, model: Model, start: float, end: float, state: Array | None = None) -> Stretch:
-        """The machine at work from `start` to `end` [s] as `model`, from a state, or from rest."""
+        """The running machine from `start` to `end` [s] as `model`, from a state, or from rest."""
         made = self._simulated(model, start, end, self._rest() if state is None else state)
         rho = self.machine.correlation
         white = self.std * np.sqrt(1.0 - rho**2) * self.random.standard_normal(len(made.time))

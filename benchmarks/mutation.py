@@ -1,4 +1,4 @@
-"""Spoilt copies of valid inputs: bytes flipped, cut, repeated and overwritten with extreme numbers; words of texts exchanged."""
+"""Corrupted copies of valid inputs: bytes flipped, cut, repeated and overwritten with extreme numbers; words of texts exchanged."""
 
 import random
 import re
@@ -22,10 +22,10 @@ EXTREME = (
     2**63,
     2**64 - 1,
 )
-SIZES = (1, 2, 4, 8)  # bytes of the numbers that file formats hold
+SIZES = (1, 2, 4, 8)  # bytes of the numbers in file formats
 PIECE = 64  # bytes that are cut, repeated or inserted at once, at most
 WORD = re.compile(rb"[A-Za-z_][A-Za-z_0-9]*|[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
-# what YAML, numbers, paths and terminals take for more than text
+# text with a special meaning in YAML, numbers, paths and terminals
 WORDS = (
     b"", b"nan", b"-inf", b"1e999", b"-1e308", b"1e-320", b"0", b"-0.0", b"1_0", b"0x7f", b"0o17", b"1:30", b"9" * 5000, b"null",
     b"yes", b"~", b"[]", b"{}", b"[" * 300, b"{a: " * 200, b"- " * 100, b"&a [*a, *a]", b"*a", b"&a", b"<<: *a", b"!!binary x",
@@ -65,7 +65,7 @@ def _number(rng: random.Random, data: bytearray) -> None:
 
 
 def _near_number(rng: random.Random, data: bytearray) -> None:
-    """A number moved a little, as lengths and positions are that do not agree."""
+    """A number that is changed slightly, like lengths and positions that do not agree."""
     size = rng.choice(SIZES)
     if len(data) < size:
         return

@@ -1,11 +1,11 @@
-"""Naming what a model lacks: rhythmid beside sparse regression (PySINDy) and a Gaussian process, on the same bags.
+"""Naming what a model lacks: comparison of rhythmid with sparse regression (PySINDy) and a Gaussian process on the same bags.
 
     python benchmarks/naming.py [--full] [--json FILE]         (needs pysindy and scikit-learn: `make benchmark-naming`)
 
-A hopper with known mass and wrong stiffness, damping and delays hides one effect, or none; three bags of 10 s to learn from, one to judge by. All
-methods know the mass and the same candidate terms. To the others' benefit: the recorded position is smoothed by the Savitzky-Golay filter, and their
-threshold and the filter's window are chosen by the error on the held-out bag; in a second row they are told both delays exactly. rhythmid is told
-neither and sees the held-out bag only to judge. `--full` gives rhythmid its whole catalogue instead of these terms and three lags.
+One effect, or none, is concealed in a hopper with known mass and wrong stiffness, damping and delays. Three bags of 10 s are for training, one is held out. All
+methods know the mass and the same candidate terms. The other methods have these advantages: the recorded position is smoothed by a Savitzky-Golay filter, and their
+threshold and the filter's window are chosen by the error on the held-out bag; in a second row they know both delays exactly. rhythmid knows
+neither, and uses the held-out bag only for evaluation. `--full` gives rhythmid its whole catalogue instead of these terms and three lags.
 
 Printed for each: whether the name is right, the free-run error on the held-out bag relative to the motion (in the same block averages), seconds of
 processor time.
@@ -42,14 +42,14 @@ from rhythmid.record.record import Record
 Array = NDArray[np.float64]
 INPUT_DELAY, MEASUREMENT_DELAY, NOISE = 0.0203, 0.0151, 1e-4
 REST = 0.2  # [m] about which the stiffness terms are taken, given to all
-TURN = 0.002  # [m/s] within which friction turns, given to the others
+TURN = 0.002  # [m/s] range in which friction changes sign, given to the others
 KNOWN = 4  # terms that belong to the nominal model: offset, spring, stance damper, force
 TERMS = ("quadratic_stiffness", "cubic_stiffness", "coulomb_friction", "quadratic_drag")
 LAGS = (
     "command_lag",
     "actuator_lag",
     "sensor_lag",
-)  # no function of the present state: only rhythmid can say them
+)  # not functions of the present state: only rhythmid can express them
 CASES: dict[str, dict[str, float]] = {
     "cubic_stiffness": {"coefficient": 1000.0},
     "quadratic_stiffness": {"coefficient": 150.0},
@@ -68,7 +68,7 @@ RUNS = (
 WINDOWS = (41, 81)  # [samples] of the smoothing filter
 THRESHOLDS = np.geomspace(1e-3, 0.3, 8)  # of the sparse regression, relative to the acceleration
 WORDS = {True: "right", False: "wrong", None: "—"}
-POINTS = 300  # that the Gaussian process learns from
+POINTS = 300  # training points of the Gaussian process
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Row:
     case: str
     method: str
     named: tuple[str, ...]
-    right: bool | None  # None of what names nothing
+    right: bool | None  # None for a method that names nothing
     heldout_nrmse: float
     seconds: float
 
@@ -96,7 +96,7 @@ class Smooth:
 
 
 def processor_time() -> float:
-    """Seconds of processor time of this process and its finished workers: the load of the machine does not count."""
+    """Seconds of processor time of this process and its finished workers, independent of the load of the computer."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used)
 
@@ -121,7 +121,7 @@ def bags(case: str, folder: Path) -> list[Record]:
 
 
 def smooth(record: Record, window: int, delays: tuple[float, float]) -> Smooth:
-    """The record smoothed, its channels moved to when the machine was there as far as `delays` (input, measurement) [s] tell."""
+    """The smoothed record, with its channels shifted by the `delays` (input, measurement) [s]."""
     assert record.input is not None and record.forcing is not None
     y, step = record.output.value, record.output.period
     time = record.output.time - delays[1]
@@ -239,7 +239,7 @@ class Regression:
         )
         terms, target = [], []
         for one in learn:
-            thin = 4 if weak else 20  # the filter has made neighbours alike
+            thin = 4 if weak else 20  # neighbouring samples are similar after the filter
             states = ps.AxesArray(
                 np.column_stack([one.x, one.v, one.f])[::thin], {"ax_time": 0, "ax_coord": 1}
             )
@@ -272,7 +272,7 @@ class Regression:
 
 
 def gaussian_process(learn: Sequence[Smooth]) -> Law:
-    """Nominal terms by least squares, and a Gaussian process over (x, v, f) on what they leave."""
+    """Nominal terms by least squares, and a Gaussian process over (x, v, f) on the residual."""
     design = np.vstack([np.column_stack(columns(s.x, s.v, s.f)[:KNOWN]) for s in learn])
     target = np.concatenate([s.a for s in learn])
     known = np.linalg.lstsq(design, target, rcond=None)[0].astype(np.float64)

@@ -1,8 +1,8 @@
-"""What this machine can do without rhythmid: a bare nanosleep loop, and a plain rclpy timer that publishes.
+"""What this computer achieves without rhythmid: a bare nanosleep loop, and a plain rclpy timer that publishes.
 
     python benchmarks/periodic_loops.py nanosleep|timer RATE SECONDS
 
-prints as JSON the ticks per second [Hz], how late they came against a fixed grid [ms], and the share of a core [%].
+prints as JSON the ticks per second [Hz], their lateness against a fixed grid [ms], and the share of a core [%].
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rhythmid_nodes.lateness import Lateness
 
 
 class Grid:
-    """Notes how late each tick is; a tick that comes more than a period late stands for all that it has missed."""
+    """Records the lateness of each tick; a tick that is more than a period late replaces all missed ticks."""
 
     def __init__(self, period_ns: int) -> None:
         self.lateness = Lateness(period_ns)

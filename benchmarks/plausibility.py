@@ -1,10 +1,10 @@
-"""How often a sound record is called implausible, and how often a wrong unit, sign or exchange is found, on random machines.
+"""How often a correct record is called implausible, and how often a wrong unit, sign or exchange is found, on random machines.
 
     python benchmarks/plausibility.py [--machines 200] [--hits 40] [--seed 0] [--kind null]
 
-Machines are those of the concealed proof, of all sorts in turn, with nominal values up to a factor of two off. A false alarm is a
-record as it was made for which another unit, sign or channel is believed. A hit is a record spoilt in one way for which that way
-is mended, or another that does the same to this machine.
+The machines are those of the concealed proof, of all kinds in turn, with nominal values that are wrong by up to a factor of two. A false alarm is a
+correct record for which another unit, sign or channel is reported. A hit is a record with one error for which this error, or an
+equivalent one for this machine, is reported.
 """
 
 import argparse
@@ -25,7 +25,7 @@ from rhythmid.proof.perform import LEARN, NOMINAL, perform
 from rhythmid.record.read import load_records
 from rhythmid.record.record import Record
 
-# what a user may have done to a record, by what mends it
+# errors that a user may make in a record, by their correction
 SPOILT = {
     "degrees as radians": Change("output", DEGREE),
     "millimetres as metres": Change("output", 1e-3),
@@ -38,7 +38,7 @@ SPOILT = {
 
 
 def made(seed: int, kind: str, index: int, design: str) -> tuple[list[Record], Model]:
-    """Records to learn from and the nominal model of one drawn case."""
+    """Records for the fit and the nominal model of one drawn case."""
     case = draw_case(seed, kind, index, design=design)  # pyright: ignore[reportArgumentType]
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -50,7 +50,7 @@ def made(seed: int, kind: str, index: int, design: str) -> tuple[list[Record], M
 
 
 def spoilt(records: list[Record], mend: Change) -> list[Record] | None:
-    """The records as they would have been without the mend."""
+    """The records as they would have been without the correction."""
     undone = mend if mend.role == "exchange" else Change(mend.role, 1.0 / mend.factor)
     found = [undone.applied(record) for record in records]
     return [one for one in found if one is not None] if any(one is not None for one in found) else None

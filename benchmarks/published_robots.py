@@ -3,7 +3,7 @@
     pip install example-robot-data
     python benchmarks/published_robots.py [--cases 24] [--seed 1] [--robots ur5_robot,solo12] [--folder DIR]
 
-A robot follows references under its controllers in a loop of its own, at steps of 1 ms and with MuJoCo's own dry friction and springs. Its log is a CSV
+A robot follows references under its controllers in a separate loop, at steps of 1 ms and with MuJoCo's own dry friction and springs. Its log is a CSV
 file of references, positions and efforts at 500 Hz with an encoder's noise and 1 % of noise on the effort. From there on the tool is used as on the
 command line: `init --body` with the file as published, then `diagnose`.
 """
@@ -30,7 +30,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.joint_record import load_joint_records
 from rhythmid.start.robot import start_robot
 
-mujoco: Any = importlib.import_module("mujoco")  # its own types are not complete
+mujoco: Any = importlib.import_module("mujoco")  # incomplete type hints
 ROBOTS = (
     "ur3_robot", "ur5_robot", "ur10_robot", "xarm7", "kinova", "z1", "so100", "so101", "solo12", "a1", "go1", "go2", "laikago", "bolt",
     "talos_left_arm", "TwoDofs", "finger_edu", "hyq_no_sensors",
@@ -45,7 +45,7 @@ ENCODER, TORQUE = 2e-5, 0.01  # rad; share of the effort's standard deviation
 
 @dataclass(frozen=True)
 class Case:
-    """A case: what was concealed where, and what was answered."""
+    """A case: the concealed effect, its joint, and the answer."""
 
     robot: str
     joint: str
@@ -57,7 +57,7 @@ class Case:
 
     @property
     def right(self) -> bool:
-        """Whether the concealed effect, or its family, is named at its joint, or nothing where nothing is concealed."""
+        """Whether the concealed effect, or its family, is named at its joint; or whether nothing is named if nothing is concealed."""
         wanted = EFFECTS[self.effect]
         if wanted is None:
             return not self.named and not self.open
@@ -72,7 +72,7 @@ class Case:
 
 
 def plant(path: Path) -> Any:
-    """The robot as MuJoCo compiles it without its shapes, its base fast, rotors of a twentieth of the joints' inertia, a little damping."""
+    """The robot as MuJoCo compiles it without its shapes, with a fixed base, rotors of a twentieth of the joints' inertia, and a little damping."""
     spec = mujoco.MjSpec.from_file(str(path))
     for shape in [one for one in spec.geoms if one.type == mujoco.mjtGeom.mjGEOM_MESH]:
         spec.delete(shape)
@@ -105,7 +105,7 @@ def log(
     lasts: float,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Rows of time, references, positions and efforts under the controllers, which know the robot's weight."""
+    """Rows of time, references, positions and efforts under the controllers, which compensate the robot's weight."""
     data = mujoco.MjData(model)
     data.qpos[:] = middle
     time = STEP * np.arange(round(lasts / STEP))

@@ -2,9 +2,9 @@
 
     python benchmarks/real_bodies.py [--only pendulum,xl330]
 
-The same recordings, windows and knowledge as the one-axis cases of real_recordings.py: weight and inertia come from an MJCF file instead of
+The same recordings, windows and known values as the one-axis cases of real_recordings.py: weight and inertia come from an MJCF file instead of
 `pendulum_gravity` and `inertia`, mass and rotor are free. Printed for each: verdict, names with probability, the errors of the effort on held-out records
-of the refitted nominal and of the augmented model in % of the effort, and the mass and rotor that were fitted. The recordings are looked for as docs/real.md says.
+of the refitted nominal and of the augmented model in % of the effort, and the mass and rotor that were fitted. docs/real.md says where the recordings are searched.
 """
 
 import argparse
@@ -54,7 +54,7 @@ MASS_SPREAD = 0.3  # of a mass: as wide as the inertia's in the one-axis cases
 
 @dataclass(frozen=True)
 class BodyCase:
-    """A body and its records, to learn from and held out."""
+    """A body and its records, for the fit and held out."""
 
     name: str
     machine: Machine
@@ -97,7 +97,7 @@ def pendulum(data: Path, folder: Path) -> BodyCase:
 
 
 def xl330(data: Path, folder: Path) -> BodyCase:
-    """Three trajectories of the servo to learn from at each gain, one held out."""
+    """Three trajectories of the servo for the fit at each gain, one held out."""
     channels = [
         "time: {column: t}",
         "effort: {column: volts, unit: N*m, taken: after_actuator}",

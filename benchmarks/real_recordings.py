@@ -3,15 +3,15 @@
     python benchmarks/real_recordings.py [--only pendulum,xl330] [--budget S] [--limit S] [--folder DIR] [--markdown] [--json FILE] [--list]
     python benchmarks/real_recordings.py --rows FILE [FILE ...] [--markdown]
 
-Every case is diagnosed by the command `rhythmid diagnose` in a process of its own, so that its processor time is its own. Printed for
-each: number of records learnt from + held out; verdict; names with probability, the dominant one first; error on held-out records of the
+Every case is diagnosed by the command `rhythmid diagnose` in a separate process, so that its processor time can be measured. Printed for
+each: number of records for the fit + held out; verdict; names with probability, the dominant one first; error on held-out records of the
 refitted nominal and of the augmented model, in % of the motion or, where the effort is predicted, of the effort; share, the part of the
 mismatch's power that all names together explain; kind of scoring; processor seconds; the largest relative error of the known parameters
-that were found; and, where the answer is known, whether it is right: `first`, the accepted effect comes first and is stated (or nothing is named where nothing is missing); `listed`, it comes first but
-the verdict does not stand by it; `no` otherwise.
+that were found; and, if the answer is known, whether it is right: `first`, the accepted effect comes first and is stated (or nothing is named if nothing is missing); `listed`, it comes first but
+is not stated; `no` otherwise.
 
-The recordings are looked for in $RHYTHMID_DATA, else in ../shared/data beside the checkout (docs/real.md); without them the simulated
-machines alone are run. `--folder` keeps signals.yaml, model.yaml, tables and answers; `--limit` ends a case after so many seconds of
+The recordings are searched in $RHYTHMID_DATA, else in ../shared/data beside the checkout (docs/real.md); without them only the simulated
+machines are run. `--folder` keeps signals.yaml, model.yaml, tables and answers; `--limit` ends a case after so many seconds of
 wall time; `--budget` is passed on to the diagnosis. `--rows` prints the rows of earlier runs again.
 """
 
@@ -45,12 +45,12 @@ HEADS = (
     "off, %",
     "right",
 )
-SAID = 120  # characters of a refusal that the table shows
+SAID = 120  # characters of an error message that the table shows
 
 
 @dataclass(frozen=True)
 class Row:
-    """The answer to one case; errors are relative (1 = as large as the motion or the effort), NaN-free: None where not told."""
+    """The answer to one case; errors are relative (1 = as large as the motion or the effort), NaN-free: None if not stated."""
 
     case: str
     records: str
@@ -204,7 +204,7 @@ def saved_rows(paths: Iterable[Path]) -> list[Row]:
 
 
 def told(rows: Sequence[Row], markdown: bool) -> None:
-    """Print all rows and what they come to."""
+    """Print all rows and their sums."""
     print(table(rows, markdown), end="\n\n")
     for line in (*mirrored(rows), *by_set(rows)):
         print(line)

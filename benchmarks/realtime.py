@@ -1,8 +1,8 @@
-"""How well the graph keeps time, beside a bare nanosleep loop and a plain rclpy timer that run meanwhile.
+"""Timing of the graph, compared with a bare nanosleep loop and a plain rclpy timer that run at the same time.
 
     python benchmarks/realtime.py [--seconds 60] [--load 4] [--lockstep 60]
 
-Four runs in real time, composed and in separate processes, with and without busy processes beside; then lockstep in both
+Four runs in real time, composed and in separate processes, with and without other busy processes; then lockstep in both
 layouts. Times in ms. `lateness` is that of ticks against their grid; `applied delay` that of a release against stamp + delay; `latency`
 goes from the release of a command until the recorder's middleware has it, by message.
 """
@@ -39,8 +39,8 @@ LOSSES = ("lost", "dropped", "skipped")
 QUANTITIES = ("p50", "p99", "p99.9", "max")
 LOOPS = ("nanosleep", "timer")
 SCRIPT = Path(__file__).with_name("periodic_loops.py")
-BEGUN = 50_000  # bytes of a bag that holds more than what was said at the start
-LOOK = 0.5  # s between two looks at the processor times
+BEGUN = 50_000  # bytes of a bag with more than the first messages
+LOOK = 0.5  # s between two measurements of the processor times
 _TICK = os.sysconf("SC_CLK_TCK")
 
 
@@ -83,7 +83,7 @@ def experiment(folder: Path, mode: str, layout: str, seconds: float) -> Path:
         "excitation": {"type": "chirp", "amplitude": 0.004, "band": [0, 7], "sweep": seconds},
         "delays": DELAYS,
         "time": {"mode": mode, "layout": layout},
-        # a busy machine is what is measured: it does not end the run
+        # a busy computer is part of the measurement, and must not end the run
         "safety": {"stale_after": 10.0, "command_timeout": 0.0},
         "record": {"topics": [*everything, "diagnostics"] if mode == "realtime" else everything},
     }
@@ -137,7 +137,7 @@ def row(name: str, told: dict[str, str], prefix: str) -> None:
 
 
 def realtime(folder: Path, layout: str, busy: int, seconds: float) -> None:
-    """One run in real time with the loops beside it."""
+    """One run in real time with the loops in parallel."""
     print(f"{layout}, {busy} busy processes beside, {os.getloadavg()[0]:.1f} ready to run at the start")
     print(f"  {'':34}{'rate Hz':>9}{''.join(f'{quantity:>9}' for quantity in QUANTITIES)}")
     bag, usage = folder / f"bag_{layout}_{busy}", Usage()

@@ -1,6 +1,6 @@
-"""The recordings of real machines as cases of the bench; docs/real.md says where they come from and what is known of them.
+"""The recordings of real machines as cases of the bench; docs/real.md gives their sources and what is known about them.
 
-They are looked for in `$RHYTHMID_DATA`, else in `../shared/data` beside the checkout; a set that is absent yields no cases.
+They are searched in `$RHYTHMID_DATA`, else in `../shared/data` beside the checkout; a set that is absent yields no cases.
 """
 
 import gzip
@@ -36,7 +36,7 @@ force:
 
 
 def silverbox_cases(data: Path, folder: Path) -> list[Case]:
-    """Three pieces of the official training part to learn from, two held out."""
+    """Three pieces of the official training part for the fit, two held out."""
     channels = [
         f"time: {{sample_rate: {SILVERBOX_RATE}}}", "input: {column: V1, unit: V, hold: zero}", "output: {column: V2, unit: V}",
     ]  # fmt: skip
@@ -81,7 +81,7 @@ force:
 
 
 def pendulum_cases(data: Path, folder: Path) -> list[Case]:
-    """From a frictionless pendulum: the windows that no hand disturbs, then all three files as they are."""
+    """With a frictionless pendulum as nominal model: the windows without pushes by hand, then all three files as they are."""
     model = write_model(folder, "pendulum", PENDULUM_MODEL)
     clean = {
         name: write_signals(folder, f"pendulum_{name}", data / PENDULUM_FILES[file], PENDULUM_CHANNELS, use)
@@ -155,7 +155,7 @@ def torque_span(columns: Mapping[str, Array]) -> tuple[float, float]:
 
 
 def xl330_cases(data: Path, folder: Path) -> list[Case]:
-    """All records whose motor stays on, three trajectories to learn from at each gain and one held out."""
+    """All records whose motor stays on, three trajectories for the fit at each gain and one held out."""
     channels = [
         "time: {column: t}", "input: {column: volts, unit: V, hold: linear}", "output: {column: position, unit: rad}",
     ]  # fmt: skip
@@ -198,7 +198,7 @@ SPREAD = 0.3  # of the inertia: the other joints move, and the rotor's share (ar
 
 
 def go2_cases(data: Path, folder: Path) -> list[Case]:
-    """Twelve joints, each a servo whose reference and motion alone are known."""
+    """Twelve joints, each a servo of which only reference and motion are known."""
     models = joint_models(data / "go2.xml", np.load(data / "traj_0.npz")["dof_pos"].mean(axis=0))
     cases: list[Case] = []
     for number, name in enumerate(f"{leg}_{joint}" for leg in LEGS for joint in JOINTS):

@@ -1,12 +1,12 @@
-"""How soon the effort at a robot is zero after a fault, over real topics and processes; and whether it stops without one.
+"""Time from a fault to zero effort at a robot, over real topics and processes; and stops without a fault.
 
     python benchmarks/safety.py [--count 100] [--fault NAME ...] [--limits robot|strict|nodes] [--load 2]
     python benchmarks/safety.py --healthy 1800 [--limits robot|strict|nodes] [--load 2]
 
-This process is the robot: it measures at 200 Hz and hears its commands. `excitation` and `command_guard` are processes
-of their own. A fault's time counts from its injection to when the guard published the first zero of those that last. `--limits` says how long
-the nodes wait: `robot`, those of docs/robot.md, with which every fault leads to zero effort within 0.1 s; `strict`, 0.05 s each; `nodes`, the nodes' defaults,
-which are those of simulated plants. `--load` adds busy processes.
+This process is the robot: it measures at 200 Hz and receives its commands. `excitation` and `command_guard` are separate
+processes. The time of a fault counts from its injection to the first zero command of the guard that lasts. `--limits` sets the timeouts of
+the nodes: `robot`, those of docs/robot.md, with which every fault leads to zero effort within 0.1 s; `strict`, 0.05 s each; `nodes`, the nodes' defaults,
+which are for simulated plants. `--load` adds busy processes.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def freeze(bench: Bench) -> Callable[[], None]:
 
 
 def jump(bench: Bench) -> Callable[[], None]:
-    """One gap in the stamps: they are behind by less than is stale, then ahead by less than that."""
+    """One gap in the stamps: they are first behind, then ahead, each by less than the limit for stale measurements."""
     limit = bench.limits.stale or DEFAULT_LIMIT
     offset = -int(0.7 * limit * 1e9)
     bench.robot.spoil = lambda stamp, position: (stamp + offset, position)
@@ -73,7 +73,7 @@ def jump(bench: Bench) -> Callable[[], None]:
 
 def killed(bench: Bench) -> Callable[[], None]:
     os.kill(bench.pid("excitation"), signal.SIGKILL)
-    return lambda: bench.stop("command_guard")  # the middleware needs 20 s to see that a publisher was killed
+    return lambda: bench.stop("command_guard")  # the middleware needs 20 s to detect a killed publisher
 
 
 def paused(bench: Bench) -> Callable[[], None]:
@@ -82,7 +82,7 @@ def paused(bench: Bench) -> Callable[[], None]:
 
 
 def stranger(bench: Bench) -> Callable[[], None]:
-    """Another node publishes ten times the effort beside the excitation."""
+    """Another node publishes ten times the effort of the excitation."""
     node = Node("stranger", namespace="/hopper")
     publisher = node.create_publisher(JointState, "command", stream(lockstep=False))
     wait(lambda: publisher.get_subscription_count() > 0, "a listener")
@@ -96,14 +96,14 @@ def stranger(bench: Bench) -> Callable[[], None]:
 
 
 def leaving(bench: Bench) -> Callable[[], None]:
-    """The only one who hears the excitation ends in good order; what is timed is when the excitation stops after that."""
+    """The only subscriber of the excitation ends regularly; measured is the time until the excitation stops."""
     bench.robot.stops.clear()
     bench.stop("command_guard")
     return lambda: None
 
 
 LEAVING = "guard_leaves"
-PREPARED = ("gap", "second_commander", LEAVING)  # faults that begin when their preparation has ended
+PREPARED = ("gap", "second_commander", LEAVING)  # faults that begin after their preparation
 FAULTS: dict[str, Callable[[Bench], Callable[[], None]]] = {
     "stale_arrival": spoilt(lambda *_: None),
     "stale_stamp": spoilt(lambda stamp, position: (stamp - 1_000_000_000, position)),
@@ -131,7 +131,7 @@ def trial(bench: Bench, fault: str) -> float:
     after = [(at, effort) for at, effort in list(heard) if at >= begin]
     last = max((number for number, (_, effort) in enumerate(after) if effort != 0.0), default=-1)
     zero = after[last + 1][0] - begin if last + 1 < len(after) else math.inf
-    if not after:  # nothing came any more, and the last was zero before
+    if not after:  # no further message, and the last one was zero
         zero = 0.0 if bench.robot.effort() == 0.0 else math.inf
     if any(abs(effort) > 1.0 for _, effort in after):
         zero = math.inf
@@ -145,7 +145,7 @@ def trial(bench: Bench, fault: str) -> float:
 
 @contextmanager
 def load(number: int) -> Iterator[None]:
-    """So many busy processes."""
+    """This number of busy processes."""
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(number)]
     try:
         yield
@@ -157,7 +157,7 @@ def load(number: int) -> Iterator[None]:
 
 @contextmanager
 def benched(limits: Limits, tell: bool) -> Iterator[Bench]:
-    """A bench in a DDS domain of its own, with these limits of time; with `tell` it prints what the nodes say."""
+    """A bench in its own DDS domain, with these timeouts; with `tell` it prints the output of the nodes."""
     with tempfile.TemporaryDirectory() as folder, own_domain() as domain:
         os.environ.pop("ROS_DOMAIN_ID", None)
         os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = (
@@ -174,7 +174,7 @@ def benched(limits: Limits, tell: bool) -> Iterator[Bench]:
 
 
 def stay_healthy(bench: Bench, seconds: float) -> bool:
-    """Whether the excitation plays on for so long; lapses of the command, from which effort comes back, are told."""
+    """Whether the excitation continues for this time; lapses of the command, after which effort returns, are reported."""
     bench.playing()
     bench.robot.heard.clear()
     until = time.monotonic() + seconds

@@ -1,4 +1,4 @@
-"""The robot and its nodes in the safety benchmark: a plant that measures and hears its commands, and what watches it."""
+"""The robot and its nodes in the safety benchmark: a plant that measures and receives commands, and its supervision."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ GUARD = {"max_effort": 1.0, "stale_after": 0.0}
 
 @dataclass(frozen=True)
 class Times:
-    """How long the nodes wait [s]: `stale` for a newer measurement (by arrival, by stamp, and from stamp to stamp), `frozen`
+    """Timeouts of the nodes [s]: `stale` for a newer measurement (by arrival, by stamp, and from stamp to stamp), `frozen`
     for another position, `command` for a newer command. None: the nodes' defaults."""
 
     stale: float | None = None
@@ -74,7 +74,7 @@ class Robot:
     def __init__(self) -> None:
         self.node = Node("robot", namespace="/hopper")
         self.heard: list[tuple[float, float]] = []
-        self.stops: list[float] = []  # when the excitation said that it had stopped [s since the epoch]
+        self.stops: list[float] = []  # time at which the excitation reported its stop [s since the epoch]
         self.spoil: Callable[[int, float], tuple[int, float] | None] = lambda stamp, position: (
             stamp,
             position,
@@ -102,7 +102,7 @@ class Robot:
         return self.heard[-1][1] if self.heard else 0.0
 
     def call(self, service: str) -> None:
-        """Call a service and wait a moment for the answer: one that was killed seems to be there for a while."""
+        """Call a service and wait a moment for the answer, because a killed node seems to exist for some time."""
         client = self.node.create_client(Trigger, service)
         wait(client.service_is_ready, service)
         future = client.call_async(Trigger.Request())
@@ -112,7 +112,7 @@ class Robot:
         self.node.destroy_client(client)
 
     def figures(self) -> dict[str, str]:
-        """How late this process measures, which is the bench's fault."""
+        """Lateness of this process's measurements, caused by the bench itself."""
         return self._grid.figures()
 
     def close(self) -> None:
@@ -141,7 +141,7 @@ class Robot:
 
 
 class Bench:
-    """The two nodes under test, restarted where a fault has ended one."""
+    """The two nodes under test, restarted if a fault has ended one."""
 
     def __init__(self, folder: Path, limits: Times, tell: bool) -> None:
         self.limits = limits
@@ -162,7 +162,7 @@ class Bench:
         return self._running[name]._process.pid
 
     def playing(self) -> None:
-        """Everything is healthy, and effort flows."""
+        """Everything is healthy, and effort is applied."""
         self.robot.measure_well()
         while True:
             wait(self._flows, "effort", 300.0)
@@ -181,7 +181,7 @@ class Bench:
         return False
 
     def stop(self, name: str) -> None:
-        """End a node in good order."""
+        """End a node regularly."""
         os.kill(self.pid(name), signal.SIGINT)
         wait(lambda: self.ended(name), f"end of {name}")
 

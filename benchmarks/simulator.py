@@ -1,4 +1,4 @@
-"""The simulator beside scipy's solve_ivp and MuJoCo, all stepping the paper's hopper: `make benchmark`.
+"""The simulator compared with scipy's solve_ivp and MuJoCo on the paper's hopper: `make benchmark`.
 
     python benchmarks/simulator.py [--duration 270] [--json FILE]
 

@@ -2,7 +2,7 @@
 
     python benchmarks/start_up.py [RUNS]
 
-prints the least and the median wall and processor seconds of a process, each beside an empty Python.
+prints the minimum and the median wall-clock and processor seconds of each process, compared with an empty Python.
 """
 
 import resource
@@ -25,7 +25,7 @@ def spent() -> float:
 
 
 def measured(arguments: list[str], runs: int) -> tuple[list[float], list[float]]:
-    """Wall and processor seconds of each of `runs` processes, after one that is not counted."""
+    """Wall-clock and processor seconds of each of `runs` processes, after one that does not count."""
     wall, processor = [], []
     for run in range(runs + 1):
         began, before = time.perf_counter(), spent()

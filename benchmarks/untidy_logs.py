@@ -1,10 +1,10 @@
-"""Logs as robots write them: is the verdict that of the clean record?
+"""Untidy logs: is the verdict the same as for the clean record?
 
     python benchmarks/untidy_logs.py [--seed N] [--cases N] [--kind NAME …] [--machine NAME …] [--effect NAME …] [--budget S]
 
 A pendulum (200 Hz), a mass on a spring and a lightly damped joint with hardly any noise (500 Hz) are simulated, each with Coulomb friction that the nominal model lacks and with nothing
-concealed, and written as a table of time, command and position. Each kind of fault spoils a copy of the table at random places; the
-table is then read and diagnosed as a user would, by signals.yaml and model.yaml. Printed for each case: the verdict and the names,
+concealed, and written as a table of time, command and position. Each kind of fault changes a copy of the table at random places. The
+table is then read and diagnosed as by a user, with signals.yaml and model.yaml. Printed for each case: the verdict and the names,
 the friction's level where it is stated with its standard deviation, the error on held-out data and the seconds; at the end, for each
 kind, how many verdicts and names are those of the clean record.
 """
@@ -32,7 +32,7 @@ from rhythmid.simulation.signal import zero_order_hold
 from rhythmid.simulation.simulate import simulate
 
 ARRIVAL = (2e-4, 6e-4)  # s by which commands are late under `command_jitter`
-STAMPED = 0.3  # standard deviation of what the stamps are out by under `stamp_jitter`, in sample periods
+STAMPED = 0.3  # standard deviation of the errors of the stamps under `stamp_jitter`, in sample periods
 IRREGULAR = 0.15  # standard deviation of the times under `jittered`, in sample periods
 HELD = 0.01  # s between writes, on average, under `held_back`
 WRITING = 2e-5  # s that it takes to write a row
@@ -53,7 +53,7 @@ class Machine:
     length: float
     noise: float
     units: tuple[str, str]
-    hold: str  # line of signals.yaml, or nothing where a new user would not write it
+    hold: str  # line of signals.yaml, or nothing if a new user would not write it
 
 
 MACHINES = {
@@ -92,7 +92,7 @@ force:
     ),
 }  # fmt: skip
 
-MACHINES["joint_fast_commands"] = replace(  # what jitter of arrival excites is far above its noise
+MACHINES["joint_fast_commands"] = replace(  # the motion that jitter of arrival excites is far above its noise
     MACHINES["joint"], excitation=MACHINES["joint"].excitation | {"band": [0.2, 60.0]}
 )
 
@@ -200,7 +200,7 @@ def stamps_out(rng: np.random.Generator, table: Table) -> Table:
 
 
 def held_back(rng: np.random.Generator, table: Table) -> Table:
-    """Rows that were held back and written in bursts, each with the time at which it was written."""
+    """Rows that were held and written in bursts, each with the time of writing."""
     t = table["t"]
     release = t[0] + np.cumsum(rng.uniform(0.0, 2.0 * HELD, int(2 * np.ptp(t) / HELD) + 2))
     late = release[np.searchsorted(release, t)] + WRITING * (np.arange(len(t)) % 10)

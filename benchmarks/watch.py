@@ -1,13 +1,13 @@
-"""The live twin on simulated machines: how soon a change of physics is reported, with which slot, and how often nothing is.
+"""The live twin on simulated machines: the time to report a change of physics, the slot, and the rate of false alarms.
 
     python benchmarks/watch.py changes --runs 34         # of each of three machines; every run is changed in four ways
     python benchmarks/watch.py days --pieces 12 --hours 2    # healthy operation, each piece another machine
 
-Machines are drawn at random about three designs. The model is not the truth but what `rhythmid identify` finds in a record of the same
-machine; each run has its own noise and excitation. The changes: friction doubled, 5 ms more delay of the command, or of the
-measurement, a payload of 5 % of the inertia. A change counts as reported when a warning comes within 10 s. Its slot is judged by what
-the twin says 10 s after the change: right when it is the first that is named. The joint has no forcing of its own, so that the delay of its
-command cannot be told from that of its measurement: there only both slots, and no other, are right, in whatever order.
+Machines are drawn at random about three designs. The model is not the true one, but is identified by `rhythmid identify` from a record of the same
+machine. Each run has its own noise and excitation. The changes: friction doubled, 5 ms more delay of the command, or of the
+measurement, a payload of 5 % of the inertia. A change counts as reported if a warning comes within 10 s. Its slot is evaluated
+10 s after the change, and is right if it is named first. The joint has no forcing, so that its
+command delay cannot be separated from its measurement delay: there exactly these two slots are right, in any order.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from rhythmid.twin.twin import Status, Twin
 Array = NDArray[np.float64]
 HEALTHY = 60.0  # s
 WITHIN = 10.0  # s
-LEAD = 12.0  # s before a change from which a twin that knows the healthy machine runs
+LEAD = 12.0  # s before a change at which a calibrated twin starts
 IDENTIFIED = 40.0  # s of record for the identification
 CHUNK = 60.0  # s simulated at a time
 FRICTION = {
@@ -49,7 +49,7 @@ CHANGES = {
     "measurement delay": "sensor",
     "payload": "inertia",
 }
-EITHER = frozenset({"command", "sensor"})  # of a delay where nothing but command and output is known
+EITHER = frozenset({"command", "sensor"})  # of a delay if only command and output are known
 LATER = 0.005  # s
 
 
@@ -62,9 +62,9 @@ def record(made: Stretch) -> Record:
 
 
 def identified(machine: Machine, seed: int, keep: Path | None, off: float | None) -> Model:
-    """What identification finds of a machine, starting from its design; read from the folder `keep` where it has been done before.
+    """The identified model of a machine, starting from its design; read from the folder `keep` if it is there.
 
-    With `off` the true parameters, each off by about that share, and the delays by that share of `LATER`: much quicker.
+    With `off` the true parameters, each wrong by about that share, and the delays by that share of `LATER`, which is much quicker.
     """
     if off is not None:
         errors = off * np.random.default_rng([seed, 4]).standard_normal(len(machine.truth.free))
@@ -91,7 +91,7 @@ def _identified(machine: Machine, seed: int) -> Model:
 
 
 def fed(twin: Twin, made: Stretch) -> Iterator[Status]:
-    """What a twin says of a stretch that comes in a second at a time."""
+    """The reports of a twin on a piece of record that arrives in steps of a second."""
     step = round(RATE)
     for first in range(0, len(made.time), step):
         part = slice(first, first + step)
@@ -115,7 +115,7 @@ def changed(model: Model, change: str, name: str) -> Model:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one change: seconds until it was reported, None where it was not within ten; the slot said then; alarms before it."""
+    """Of one change: seconds until it was reported, None if not within ten; the reported slot; alarms before it."""
 
     machine: str
     seed: int
@@ -132,12 +132,12 @@ class Outcome:
 
     @property
     def inseparable(self) -> bool:
-        """Whether nothing that is measured tells the change from one in another slot."""
+        """Whether the measurements do not separate the change from one in another slot."""
         return DRIVES[self.machine][0] == 0.0 and CHANGES[self.change] in EITHER
 
     @property
     def right(self) -> bool:
-        """Whether the answer is right: the slot first, or both slots that nothing tells apart."""
+        """Whether the answer is right: the slot first, or both slots if they are not separable."""
         if self.inseparable:
             return self.named == EITHER
         return self.after is not None and self.slot == CHANGES[self.change]
@@ -238,7 +238,7 @@ def days(
     keep: Path | None,
     off: float | None,
 ) -> None:
-    """Print how many alarms come in healthy operation."""
+    """Print the number of alarms in healthy operation."""
     total, alarms = 0.0, 0
     largest: list[float] = []
     for piece in range(pieces):

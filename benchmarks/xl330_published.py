@@ -4,19 +4,19 @@
 
 Two errors of each model, in % (rms of the error / standard deviation of what was recorded):
 
-- effort: the motor's voltage that the model needs for the recorded motion (low-passed at 12 Hz without phase), samples at rest, saturated
-  or switched off left out. A smaller one than 100 % says that motion and voltage belong together.
+- effort: the motor's voltage that the model needs for the recorded motion (low-passed at 12 Hz without phase), without samples at rest, saturated
+  or switched off. A value below 100 % shows that motion and voltage are related.
 - motion: the position when the model runs free in closed loop, from the recorded goal and the first recorded position on.
 
-Beside them a friction that is proportional to the torque that the joint transmits, mu |m l^2 a + m g l sin q| sgn v, fitted to three
-trajectories at all gains and judged, as all others, by the held-out one, and the same fit with viscous or Coulomb friction instead.
+For comparison, a friction that is proportional to the torque that the joint transmits, mu |m l^2 a + m g l sin q| sgn v, is fitted to three
+trajectories at all gains and evaluated, like the others, on the held-out one. The same fit is made with viscous or Coulomb friction instead.
 
-`--model` runs models that `rhythmid diagnose --save-model` wrote in the same way; effects other than friction and the motor are left out, and
-said so.
+`--model` runs models that `rhythmid diagnose --save-model` wrote in the same way; effects other than friction and the motor are left out, with a
+message.
 
-The firmware's law, duty = gain (goal - position) clipped to 1, was read off the recordings: `load` counts 885 at full duty, gain = 2.545/885
-per unit of the firmware's gain and rad. The published constants belong to the authors' 0.00246, found with an oscilloscope on another servo, and
-are run with that.
+The firmware's law, duty = gain (goal - position) clipped to 1, was estimated from the recordings: `load` is 885 counts at full duty, gain = 2.545/885
+per unit of the firmware's gain and rad. The published constants refer to the authors' 0.00246, measured with an oscilloscope on another servo, and
+are run with this value.
 """
 
 import argparse
@@ -186,7 +186,7 @@ def motion_error(servo: Servo, log: Log) -> tuple[float, float, int]:
 
 def fitted(seen: Sequence[Log], law: str) -> Servo:
     """Constants of a servo by inverse-dynamics least squares, robust (Student-t with 4 degrees of freedom); `law` is `viscous`, `coulomb` or
-    `transmitted`. Torque constant and winding resistance cannot be told from friction by these data: kt is the published one of m6."""
+    `transmitted`. These data do not separate torque constant and winding resistance from friction: kt is the published one of m6."""
     rows, volts = [], []
     for log in seen:
         q, v, a, duty = moving(log)
@@ -227,8 +227,8 @@ def published(folder: Path, name: str) -> Servo:
 def of_model(model: Model) -> tuple[Servo, tuple[str, ...]]:
     """The servo that a saved model describes, in volts or in N m with a `dc_motor`, and the elements that are not counted here.
 
-    In volts all torques are k_t/R times what they were, known from gravity's, and back-EMF is part of the damping: a torque constant next to
-    nothing leaves it there.
+    In volts all torques are multiplied by k_t/R, which is known from gravity. The back-EMF is part of the damping; a torque constant close to
+    zero leaves it there.
     """
     values = {name: value.value for name, value in model.parameters.items()}
     counted = {
@@ -274,7 +274,7 @@ def gains_of(everything: Sequence[Log]) -> list[int]:
 
 
 def constants(servo: Servo) -> str:
-    """What a servo comes to; R/kt in the volts of the recorded duty, whatever gain its constants belong to."""
+    """Constants of a servo in one line; R/kt in the volts of the recorded duty, whatever gain its constants refer to."""
     volts = servo.error_gain * FULL_DUTY / COUNTS
     return (
         f"R/kt {servo.R / servo.kt / volts:.2f} V/(N m), mu {servo.transmitted:.3f}, armature {servo.armature:.5f} kg m^2, "

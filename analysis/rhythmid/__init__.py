@@ -1,6 +1,6 @@
 """rhythmid finds out why a simulation disagrees with a robot: missing physics, parameters, delays and transfer functions, from recordings.
 
-Start with `load`, `Model.load`, `identify` and `diagnose`; docs/python.md shows the whole way. Everything is imported where it is
+Start with `load`, `Model.load`, `identify` and `diagnose`; docs/python.md shows how they work together. Every name is imported when it is
 first used, so that `import rhythmid` itself is fast.
 """
 

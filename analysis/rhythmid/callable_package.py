@@ -1,4 +1,4 @@
-"""Packages that are called like the function they are named after: `rhythmid.identify(records)`.
+"""Packages that can be called like their main function: `rhythmid.identify(records)`.
 
 `rhythmid.identify` is a package, and Python binds the name to it as soon as one of its modules is imported. So that the same name
 is the function for users, the package itself can be called, and shows the function's signature and docstring.
@@ -32,5 +32,5 @@ class CallablePackage(ModuleType):
 
 
 def make_callable(name: str) -> None:
-    """Let a package that is being imported be called; `name` is its `__name__`."""
+    """Make a package that is being imported callable; `name` is its `__name__`."""
     sys.modules[name].__class__ = CallablePackage

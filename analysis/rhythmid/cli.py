@@ -1,4 +1,4 @@
-"""The command `rhythmid`. Exit codes: 0 an answer was reached, 2 bad usage or bad input, 1 a failure of ours."""
+"""The command `rhythmid`. Exit codes: 0 an answer was reached, 2 bad usage or bad input, 1 an internal error."""
 
 import errno
 import importlib
@@ -17,7 +17,7 @@ from rhythmid.errors import InputError
 from rhythmid.ros_packages import not_installed
 
 NAME = "rhythmid"
-NARROW = 80  # columns below which framed help would cut off the options' names
+NARROW = 80  # in fewer columns, framed help would cut off the options' names
 app = typer.Typer(
     name=NAME,
     help="Find out why a simulation disagrees with a robot: name the physics that a model lacks, and identify parameters and delays, from recordings.",
@@ -28,7 +28,7 @@ app = typer.Typer(
     rich_markup_mode="rich" if shutil.get_terminal_size().columns >= NARROW else None,
 )
 COMMAND_GROUP = "rhythmid.commands"
-RUN = "run"  # which the package rhythmid_bringup adds
+RUN = "run"  # added by the package rhythmid_bringup
 UNUSABLE_PATHS = (errno.ENAMETOOLONG, errno.EACCES)  # of a path that the user gave, whoever looks at it first
 SEVERAL = ("--holdout", "--elements")  # options that may be followed by several values
 PARTS = (
@@ -39,7 +39,7 @@ PARTS = (
     "model_line",
     "options",
     "terminal",
-)  # modules of `commands` that are no command
+)  # modules of `commands` that are not commands
 
 
 def _version(show: bool) -> None:
@@ -84,7 +84,7 @@ def main() -> None:
             raise
         _refuse(str(InputError(f"{error.filename}: {error.strerror}")))
     except Exception as error:
-        describe = getattr(error, "format_message", None)  # bad usage, found by the parser
+        describe = getattr(error, "format_message", None)  # bad usage, detected by the parser
         if describe is None:
             raise
         _refuse(describe())
@@ -98,7 +98,7 @@ def _run(arguments: Annotated[list[str] | None, typer.Argument(metavar="EXPERIME
 
 
 def spread(arguments: list[str]) -> list[str]:
-    """Arguments in which several values after one `--holdout` or `--elements` stand one by one behind their option."""
+    """Arguments in which an option with several values, such as `--holdout a b`, is repeated for each value."""
     found: list[str] = []
     option, taken = "", 0
     for argument in arguments:

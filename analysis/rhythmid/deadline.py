@@ -1,7 +1,7 @@
-"""A deadline: the time after which work that goes on until it is good enough ends with what it has.
+"""A deadline: the time after which iterative work ends with its present result.
 
-It holds for all that is called while it is open, in the same thread and in the processes forked there, so that a fit deep within a
-search need not be handed it. Work that has to be done whatever the time goes on `without_deadline`.
+It applies to everything that is called while it is open, in the same thread and in the processes forked there, so that it need not be
+passed to a fit deep within a search. Work that has to be done in any case runs `without_deadline`.
 """
 
 import math
@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-SPENT = "the time given was spent"  # why something was not tried
+SPENT = "the time given was spent"  # reason why something was not tried
 _END: ContextVar[float] = ContextVar("end", default=math.inf)
 
 
@@ -35,5 +35,5 @@ def without_deadline() -> Iterator[None]:
 
 
 def time_is_up() -> bool:
-    """Whether a deadline that is open has passed."""
+    """Whether an open deadline has passed."""
     return time.monotonic() >= _END.get()

@@ -1,4 +1,4 @@
-"""A YAML document that remembers where each value stands, so that a complaint can name file and line."""
+"""A YAML document that knows the line of each value, so that an error message can name file and line."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from rhythmid.errors import InputError
 
 LARGEST = (
     4 << 20
-)  # characters of a document: a minute's reading; the largest that are written have some thousands
-MOST_VALUES = 200_000  # of a document, those that aliases repeat counted each time: a few lines of them stand for billions
+)  # characters of a document: a minute to read; the largest written by hand have some thousands
+MOST_VALUES = 200_000  # values of a document, with those repeated by aliases: a few lines of aliases can expand to billions
 LONGEST_PATH = 1024  # characters; as long as YAML lets a plain key be
 
 
@@ -39,7 +39,7 @@ class Node:
         return self.value
 
     def at(self, key: str | int) -> "Node":
-        """What stands at a key or an index, the node itself where nothing does."""
+        """The value at a key or an index; the node itself if there is none."""
         if isinstance(self.value, dict) and key in self.value:
             return self.value[key]
         if isinstance(self.value, list) and isinstance(key, int) and key < len(self.value):
@@ -58,7 +58,7 @@ class Node:
         return self.value
 
     def items(self) -> "list[Node]":
-        """The value as a list; nothing counts as an empty list."""
+        """The value as a list; an empty value counts as an empty list."""
         if self.value is None:
             return []
         if not isinstance(self.value, list):
@@ -67,13 +67,13 @@ class Node:
 
 
 def unknown_key(key: str, known: Sequence[str]) -> str:
-    """What to say of a key that is not among those known."""
+    """Message about an unknown key."""
     near = get_close_matches(key, known, 1)
     return f"unknown key; {f'did you mean {near[0]!r}?' if near else 'known: ' + ', '.join(known)}"
 
 
 def as_node(plain: Any, name: str, path: str = "") -> Node:
-    """A value that was no document, such as a parameter in JSON, as if one held it; `name` stands for its place."""
+    """A value that does not come from a document, such as a parameter in JSON, as a node; `name` stands for its place."""
     if isinstance(plain, Mapping):
         held = {str(k): as_node(v, name, f"{path}.{k}" if path else str(k)) for k, v in plain.items()}
         return Node(held, name, path)
@@ -90,7 +90,7 @@ def _node(
     left: Iterator[int],
     line: int | None = None,
 ) -> Node:
-    """`line` is where the key of this value stands: the value itself may begin further down. `left` counts down the values
+    """`line` is the line of the key of this value; the value itself may begin further down. `left` counts down the values
     that the document may still hold."""
     if raw is None:
         return Node(None, name, path)
@@ -118,7 +118,7 @@ def _node(
         )
     try:
         return Node(loader.construct_object(raw), place, path)
-    except ValueError as error:  # a date that does not exist, say
+    except ValueError as error:  # for example a date that does not exist
         raise InputError(f"{place}: {path}: {error}") from None
     except (LookupError, AttributeError, TypeError, OverflowError):
         raise InputError(f"{place}: {path}: {raw.value!r} is no {raw.tag.rsplit(':', 1)[-1]}") from None

@@ -1,13 +1,13 @@
-"""The one error that a user is meant to read."""
+"""The error class for messages to the user."""
 
-LONGEST_MESSAGE = 1000  # characters of a message: some ten lines of a terminal
-HEAD = 700  # of them from the beginning, where a longer message is shortened
+LONGEST_MESSAGE = 1000  # characters of a message: about ten lines of a terminal
+HEAD = 700  # of them from the beginning, if a longer message is shortened
 
 
 class InputError(ValueError):
     """Bad input: one line that says what is wrong, where, and what to do. The command line exits with code 2.
 
-    Messages quote files: line breaks and control characters become spaces, and what is longer than LONGEST_MESSAGE is shortened in the middle.
+    Messages may quote files, so line breaks and control characters become spaces, and messages longer than LONGEST_MESSAGE are shortened in the middle.
     """
 
     def __init__(self, problem: object = "") -> None:

@@ -1,7 +1,7 @@
-"""One file says all of a run: machine, excitation, delays, noise, time mode, what is recorded and where.
+"""One file describes a run: machine, excitation, delays, noise, time mode, what is recorded and where.
 
-`rhythmid simulate`, `rhythmid run` and the launch file read the same experiment.yaml. `Experiment.nodes` is the one
-function that turns it into nodes with parameters; `perform` is the same run without ROS.
+`rhythmid simulate`, `rhythmid run` and the launch file read the same experiment.yaml. Only `Experiment.nodes` turns it
+into nodes with parameters; `perform` is the same run without ROS.
 """
 
 import os
@@ -24,7 +24,7 @@ from rhythmid.model import Model
 from rhythmid.settings import KEYS, Delay, Forcing, Noise, Recording, Safety, TimeMode
 from rhythmid.validation import ByShape, InKeys, Number, Plain, Whole, validated
 
-LONGEST_DELAY = 10.0  # [s]; a longer one is given in another unit
+LONGEST_DELAY = 10.0  # [s]; a longer one was probably given in another unit
 LONGEST_RUN = 50_000_000  # samples of an offline run: 14 hours at 1 kHz, a few gigabytes
 
 
@@ -66,7 +66,7 @@ class Experiment:
     excitation, excitation_spec
         The command over time, and how the file describes it.
     forcing
-        Made on the machine: amplitude [N], frequency [Hz], phase [rad].
+        Forcing generated on the machine: amplitude [N], frequency [Hz], phase [rad].
     input_delay, measurement_delay
         Of command and measurement [s], or profiles of them.
     noise
@@ -84,15 +84,15 @@ class Experiment:
     record
         The bag, and which topics it holds.
     namespace, joint
-        Under which names the nodes speak.
+        Namespace and joint name of the topics.
     folder
-        From which relative paths start.
+        Folder to which relative paths refer.
     elements
-        Folders with elements of one's own.
+        Folders with the user's own elements.
 
     Examples
     --------
-    `Experiment.load` reads a file; a mapping does where a function takes an experiment.
+    `Experiment.load` reads a file. Functions that take an experiment also accept a mapping.
 
     >>> import rhythmid as rh
     >>> run = rh.simulate(rh.paper_hopper(), {"excitation": {"type": "chirp", "amplitude": 0.01, "sweep": 2.0}})
@@ -124,13 +124,13 @@ class Experiment:
         cls, path: str | Path, elements: tuple[Path, ...] = (), model: str | Path | None = None
     ) -> "Experiment":
         """The experiment in a YAML file; paths in it are relative to it, except the bag's, which is relative to
-        where the command is run. `model` is a model file that takes the place of the one named there. Raises InputError
+        where the command is run. `model` is a model file that replaces the one named there. Raises InputError
         naming the line and key of what is wrong."""
         return _experiment(read(path), Path(path).resolve().parent, elements, model)
 
     @classmethod
     def from_text(cls, text: str, folder: str | Path = ".") -> "Experiment":
-        """The experiment in a YAML text whose relative paths start at `folder`."""
+        """The experiment in a YAML text whose relative paths refer to `folder`."""
         return _experiment(parse(text, "experiment"), Path(folder).resolve(), ())
 
     @property
@@ -144,11 +144,11 @@ class Experiment:
         return plant_model(self.model, self.forcing, self.noise, load_catalogue(self.elements))
 
     def with_record(self, **changes: Any) -> "Experiment":
-        """A copy that records otherwise."""
+        """A copy with other settings of the recording."""
         return replace(self, record=replace(self.record, **changes))
 
     def description(self) -> dict[str, Any]:
-        """What the topic `run` says: the experiment as run, without model, delays and noise, which are to be found."""
+        """Content of the topic `run`: the experiment as run, without model, delays and noise, because these are to be identified."""
         return {
             "program": "rhythmid",
             "excitation": dict(self.excitation_spec),
@@ -176,7 +176,7 @@ class Experiment:
         streams = [topic for topic in self.record.topics if topic not in ("run", "diagnostics")]
         sinks = (
             ["recorder"] if streams else []
-        )  # what the credit of lockstep waits for at the end of the path
+        )  # last consumer of the path, for which the credit of lockstep waits
 
         def injector(name: str, source: str, target: str, delay: Delay) -> NodeSpec:
             return NodeSpec(
@@ -278,7 +278,7 @@ def _settled(word: str) -> str:
 
 
 def of_topic(namespace: str) -> str:
-    """A namespace that topics may have; ValueError for any other."""
+    """A valid namespace of topics; ValueError for any other."""
     if not re.fullmatch(r"(/[A-Za-z_]\w*)+", namespace, re.ASCII):
         raise ValueError(f"{namespace!r} is no namespace; write one like /hopper or /lab/hopper")
     return namespace
@@ -311,7 +311,7 @@ class _Start:
 
 @dataclass(frozen=True)
 class _Document:
-    """experiment.yaml as it is written."""
+    """Content of experiment.yaml."""
 
     __pydantic_config__ = KEYS
     excitation: AnyExcitation
@@ -336,7 +336,7 @@ _DOCUMENT: TypeAdapter[_Document] = TypeAdapter(_Document)
 
 
 def _delay(given: _Profile | float | None, model: Model, label: str, folder: Path) -> Delay:
-    """The delay as it is given, else the model's."""
+    """The given delay, else that of the model."""
     if given is None:
         term = model.term(label)
         return Delay() if term is None else Delay(term.values["delay"].value)
@@ -348,7 +348,7 @@ def _delay(given: _Profile | float | None, model: Model, label: str, folder: Pat
 
 
 def _forcing(given: Forcing | None, model: Model) -> tuple[Forcing, Model]:
-    """The forcing as it is given, else the model's; and the model without its own."""
+    """The given forcing, else that of the model; and the model without its own forcing."""
     term = model.term("periodic_forcing")
     if term is None or given is not None:
         return given or Forcing(), model if term is None else model.without("periodic_forcing")
@@ -366,7 +366,7 @@ def _experiment(
         document.fail("'model:' is missing")
     else:
         model_path = folder / given.model
-        if not os.path.isfile(model_path):  # also where the name is too long for any file
+        if not os.path.isfile(model_path):  # also if the name is too long for a file
             document.at("model").fail(f"no such file: {model_path}")
     model = Model.of_one_axis(model_path, load_catalogue(elements))
     place = document.at("excitation")

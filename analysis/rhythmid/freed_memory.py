@@ -1,7 +1,7 @@
-"""Memory that was let go, given back to the system.
+"""Return freed memory to the system.
 
-The C library keeps what is freed for what comes next. After work on many long records that is hundreds of megabytes, in pieces between
-what is still in use; a forked process that fills them again gets a copy of each.
+The C library keeps freed memory for later use. After work on many long records these are hundreds of megabytes, in pieces between
+memory that is still in use. A forked process that fills them again gets a copy of each piece.
 """
 
 import ctypes
@@ -19,7 +19,7 @@ def _trim() -> Callable[[int], int] | None:
 
 
 def give_back() -> None:
-    """Give all memory that is free back to the system, where the C library can."""
+    """Return all free memory to the system, if the C library can."""
     trim = _trim()
     if trim is not None:
         trim(0)

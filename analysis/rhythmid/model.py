@@ -21,7 +21,7 @@ from rhythmid.validation import validated
 from rhythmid.value import Value, entry_of, value_of
 
 INERTIA = "inertia.mass"
-CONTROLLER = "position_control"  # what an element that acts on a controller's measurements asks for where there is none
+CONTROLLER = "position_control"  # required by an element that acts on a controller's measurements
 MASS = Parameter("mass", "kg", "inertia", bounds=(0.0, math.inf))
 
 
@@ -40,7 +40,7 @@ class Term:
 
     @property
     def against(self) -> Against | None:
-        """Against what a friction or a damper acts; None where that is no choice."""
+        """The body against which a friction or a damper acts; None if there is no choice."""
         return self.element.against
 
 
@@ -55,7 +55,7 @@ class Model:
     terms
         The elements in the order of the path.
     units
-        In which forces and positions are counted.
+        Units of forces and positions.
 
     Examples
     --------
@@ -79,20 +79,20 @@ class Model:
 
     @classmethod
     def load(cls, path: str | Path, catalogue: Catalogue | None = None) -> "Model":
-        """The model in a YAML file; a `Machine` where the file has a `body:`, which the functions of rhythmid take as well.
+        """The model in a YAML file. If the file has a `body:`, this is a `Machine`, which the functions of rhythmid also accept.
 
         Raises InputError naming line, parameter and unit of what is wrong.
         """
         document = read(path)
         if isinstance(document.value, dict) and "body" in document.value:
-            from rhythmid.body.machine import Machine  # it needs MuJoCo, and models itself
+            from rhythmid.body.machine import Machine  # it needs MuJoCo, and imports this module
 
             return cast("Model", Machine.load(path, catalogue))
         return cls.from_document(document, catalogue)
 
     @classmethod
     def of_one_axis(cls, path: str | Path, catalogue: Catalogue | None = None) -> "Model":
-        """The model in a YAML file, of one axis alone. Raises InputError as `load` does, and for a machine of several joints."""
+        """The model of one axis in a YAML file. Raises InputError as `load` does, and for a machine of several joints."""
         return cls.from_document(read(path), catalogue)
 
     @classmethod
@@ -120,7 +120,7 @@ class Model:
 
     @property
     def setting(self) -> Setting:
-        """What decides which effects it could lack."""
+        """Properties that decide which effects the model could lack."""
         return Setting(
             frozenset((term.element.name, term.against) for term in self.terms),
             frozenset(self.parameters),
@@ -159,7 +159,7 @@ class Model:
         return self.with_parameters({n: replace(current[n], value=float(v)) for n, v in values.items()})
 
     def unwound(self) -> "Model":
-        """A copy whose free phases lie within half a turn of zero; the model is the same."""
+        """An equivalent copy whose free phases lie within half a turn of zero."""
         turns = {f"{t.label}.{p.name}": p.turn for t in self.terms for p in t.element.parameters}
         return self.with_values(
             {name: math.remainder(self.value(name), turns[name]) for name in self.free if name in turns}
@@ -221,7 +221,7 @@ class Model:
                 raise InputError(f"element {term.label!r} needs {lacking!r}, which the model does not have")
 
     def lacking(self, term: Term) -> str | None:
-        """Name of an element that `term` needs and the model lacks; None where nothing is lacking."""
+        """Name of an element that `term` needs and the model lacks; None if there is none."""
         if term.element.acts == "observation" and not self.setting.controlled:
             return CONTROLLER
         for source, default in term.element.borrows.values():
@@ -246,7 +246,7 @@ class Model:
         return yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
 
     def save(self, path: str | Path) -> None:
-        """Write the model; nothing is left half-written. Raises InputError when the place is not writable."""
+        """Write the model file completely or not at all. Raises InputError when the place is not writable."""
         write_text(Path(path), self.to_yaml())
 
 
@@ -257,7 +257,7 @@ def _labels(name: str) -> Iterator[str]:
 
 
 def _fed(units: Units, behind: Iterable[Element]) -> Units:
-    """Units of a signal that elements behind it take: volts before a motor that is fed with a voltage."""
+    """Units of the signal that later elements take: volts before a motor that is driven by a voltage."""
     taken = next((element.takes for element in behind if element.slot == "actuator" and element.takes), None)
     return units if taken is None else replace(units, force=taken)
 
@@ -320,14 +320,14 @@ def _term(item: Node, slot: str, catalogue: Catalogue, units: Units, taken: set[
         else:
             values[parameter.name] = Value(
                 parameter.default, units.of(parameter.unit), True, parameter.bounds
-            )  # what the file does not mention is not estimated
+            )  # parameters that are not in the file are not estimated
     label = next(label for label in _labels(name) if label not in taken)
     taken.add(label)
     return Term(element, label, values)
 
 
 def _named(item: Node, catalogue: Catalogue) -> Iterator[Element]:
-    """The element that an entry of the path names, none where it names none that is known."""
+    """The element named by an entry of the path; None if the name is unknown."""
     if isinstance(item.value, dict):
         yield from (catalogue[str(name)] for name in item.value if str(name) in catalogue)
 

@@ -26,15 +26,15 @@ from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.simulation.machine_code import load_run
 
-BOUND = 1024  # runs that are known at once; further ones are bound anew when their turn comes
+BOUND = 1024  # runs that are kept at once; others are bound again at their next call
 
 
 def apply(model: Any, data: Any, elements: tuple[str, ...] = ()) -> Array:
     """Put the forces of the joints' paths into `data`, before `mj_step`.
 
-    Delays, lags, controllers, friction laws and all else of the command, actuator and force slots act from then on as in
-    `rhythmid simulate`; MuJoCo's own actuators, damping and, but for friction that is a constraint, dry friction of these joints rest. `data.ctrl` holds the commands: a
-    reference where the path has a controller, else a force. States and pasts lie in `data.userdata`: a reset begins anew.
+    From then on delays, lags, controllers, friction laws and all other elements of the command, actuator and force slots act as in
+    `rhythmid simulate`. MuJoCo's own actuators, damping and dry friction of these joints are switched off, except for friction that is a constraint. `data.ctrl` holds the
+    commands: a reference if the path has a controller, else a force. States and past signals are stored in `data.userdata`, so that a reset clears them.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def apply(model: Any, data: Any, elements: tuple[str, ...] = ()) -> Array:
 
     Returns
     -------
-    float64[joints], the positions [rad or m] that the joints' sensors tell now, delays included, noise and rounding not. The next
+    float64[joints], the positions [rad or m] that the joints' sensors measure now, with delays, without noise and rounding. The next
     call overwrites it.
 
     Raises
@@ -71,7 +71,7 @@ class _Bound:
     output: Array
 
     def begin(self, model: Any, data: Any) -> None:
-        """States as they would be after a while at this pose, with this command."""
+        """Steady states at this pose with this command."""
         states = start_states(
             self.paths, self.joints, self.layout, data.qpos, data.qvel, data.ctrl[self.control], np.zeros(len(self.paths))
         )  # fmt: skip
@@ -82,7 +82,7 @@ class _Bound:
 
 
 def rest(model: Any, joints: dict[str, Joint], control: list[int]) -> None:
-    """Switch off what the paths do instead: dry friction and actuators; damping is set at each step."""
+    """Switch off what the paths replace: dry friction and actuators; damping is set at each step."""
     model.dof_frictionloss[[one.velocity for one in joints.values()]] = 0.0
     model.actuator_gainprm[control] = 0.0
     model.actuator_biasprm[control] = 0.0

@@ -1,4 +1,4 @@
-"""An experiment run without ROS: what every topic carries, as a record and as a bag."""
+"""An experiment run without ROS: the content of every topic, as a record and as a bag."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class OfflineRun(Result):
     experiment
         As it was run.
     messages
-        What each topic carries, by its name within the namespace; the true motion is `plant/joint_states`.
+        Content of each topic, by its name within the namespace; the true motion is `plant/joint_states`.
 
     Examples
     --------
@@ -51,7 +51,7 @@ class OfflineRun(Result):
 
     @property
     def record(self) -> Record:
-        """The run as a user of the robot sees it: command, forcing and delayed, noisy position."""
+        """The run as seen by a user of the robot: command, forcing and the delayed, noisy position."""
         known = self.experiment
         sources = Signals.default(known.namespace, known.joint).channels
         topics = {"output": "joint_states", "input": "excitation", "forcing": "forcing"}
@@ -76,7 +76,7 @@ class OfflineRun(Result):
         return tuple(topic for topic in wanted if topic in self.messages)
 
     def save(self, path: str | Path, all_topics: bool = False) -> Path:
-        """Write the bag that the graph would record; with `all_topics` the true output and command, too.
+        """Write the bag that the graph would record; with `all_topics` also the true output and command.
 
         Raises
         ------
@@ -136,7 +136,7 @@ def simulate(
     Parameters
     ----------
     model
-        The machine, or its file; None for the one that the experiment names.
+        The machine, or its file; None for the model named in the experiment.
     experiment
         An experiment.yaml, or its content as a mapping: excitation, forcing, delays, noise, duration, …
     elements
@@ -145,13 +145,13 @@ def simulate(
     Returns
     -------
     OfflineRun
-        With the `record` that an identification would be given; `save` writes the bag. A machine of several joints gives a `JointRun`,
-        which has these as well.
+        With the `record` for an identification; `save` writes the bag. A machine of several joints gives a `JointRun`,
+        which has both as well.
 
     Raises
     ------
     InputError
-        In one line, naming the key that is wrong, or where the simulation diverges.
+        In one line, naming the wrong key, or if the simulation diverges.
 
     Examples
     --------
@@ -184,7 +184,7 @@ def simulate(
 def _described(
     model: str | Path | None, experiment: Mapping[str, Any] | str | Path, elements: tuple[Path, ...]
 ) -> Experiment:
-    """The experiment with the model in a file taking the place of its own."""
+    """The experiment with its model replaced by that in a file."""
     if not isinstance(experiment, Mapping):
         return Experiment.load(experiment, elements, model)
     content = dict(experiment)
@@ -196,11 +196,11 @@ def _described(
 
 
 def perform(experiment: Experiment) -> dict[str, Messages]:
-    """Run the experiment without ROS: what each topic of the graph carries, by topic name within the namespace.
+    """Run the experiment without ROS. Returns the content of each topic of the graph, by topic name within the namespace.
 
     Equals the graph's lockstep run, sample by sample and stamp by stamp. Raises InputError for a run too long to keep.
     """
-    # the compiler behind the plant is slow to load, and most nodes need no plant
+    # the plant's compiler is slow to load, and most nodes do not need a plant
     from rhythmid.simulation.command_hold import RAMP, CommandHold
     from rhythmid.simulation.plant import Plant
 

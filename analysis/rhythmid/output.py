@@ -1,4 +1,4 @@
-"""Results as files: written whole or not at all, and never over something that exists."""
+"""Results as files: written completely or not at all, and never over an existing file."""
 
 import json
 import math
@@ -11,12 +11,12 @@ from typing import Any
 
 from rhythmid.errors import InputError
 
-STANDARD_OUTPUT = Path("-")  # the name by which JSON goes there instead of to a file
+STANDARD_OUTPUT = Path("-")  # the name for standard output instead of a file
 PARTIAL = ".{}.partial"  # name of a result while it is written
 
 
 def require_new(*paths: Path | None) -> None:
-    """Refuse, before any work, results that would overwrite something or one another, or that cannot be written."""
+    """Refuse, before any work, results that would overwrite existing files or one another, or that cannot be written."""
     given = [path for path in paths if path is not None and path != STANDARD_OUTPUT]
     for number, path in enumerate(given):
         if os.path.lexists(path):
@@ -27,12 +27,12 @@ def require_new(*paths: Path | None) -> None:
 
 
 def require_writable(path: Path) -> None:
-    """Refuse a result that cannot be made; folders that are missing above it will be."""
+    """Refuse a result that cannot be written. Missing folders above it will be created."""
     folder = next(parent for parent in path.absolute().parents if os.path.lexists(parent))
     longest = os.pathconf(folder, "PC_NAME_MAX") - len(PARTIAL.format(""))
     if any(len(os.fsencode(part)) > longest for part in path.parts):
         raise InputError(f"{path}: cannot be written: a name in it is longer than {longest} bytes")
-    try:  # permissions alone do not tell: file systems may be read-only, full, or no place for files
+    try:  # permissions are not sufficient: a file system may be read-only or full, or may not hold files
         probe, name = tempfile.mkstemp(prefix=".rhythmid.", dir=folder)
         os.close(probe)
         os.unlink(name)
@@ -41,7 +41,7 @@ def require_writable(path: Path) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a result file whole or not at all, and the folders above it that are missing."""
+    """Write a result file completely or not at all, and create missing folders above it."""
     partial = path.with_name(PARTIAL.format(path.name))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -50,7 +50,7 @@ def write_text(path: Path, text: str) -> None:
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     finally:
-        with suppress(OSError):  # what an interruption or a full disk has left of it
+        with suppress(OSError):  # remains after an interruption or on a full disk
             partial.unlink()
 
 

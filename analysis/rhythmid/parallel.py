@@ -1,7 +1,7 @@
 """Map a function over items in forked worker processes.
 
-Compiling and fitting a model hold the interpreter lock, so threads would take turns. A fork hands the items over as they
-are: nothing but the results is pickled. Where the system cannot fork, the items are worked through one after another.
+Compiling and fitting a model hold the interpreter lock, so threads would not run in parallel. A fork passes the items as they
+are; only the results are pickled. If the system cannot fork, the items are processed one after another.
 """
 
 import gc
@@ -23,7 +23,7 @@ from rhythmid.freed_memory import give_back
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-AHEAD = 2  # results for each processor that wait to be taken: one more than keeps it busy, for they take unequal times
+AHEAD = 2  # waiting results per processor: one more than keeps it busy, because items take unequal times
 
 
 def cores() -> int:
@@ -33,7 +33,7 @@ def cores() -> int:
 
 @contextmanager
 def _interrupted_afterwards() -> Iterator[None]:
-    """Within this, Ctrl-C is put off to the end: what its handler raises among the callbacks of a fork, Python prints and forgets."""
+    """Within this block, Ctrl-C is deferred to the end, because Python only prints exceptions that are raised in the callbacks of a fork."""
     usual = signal.getsignal(signal.SIGINT)
     if usual is None or threading.current_thread() is not threading.main_thread():
         yield
@@ -52,7 +52,9 @@ def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Iterable[in
     # What was inherited is not this process's to collect: going through it would copy the parent's memory, and may
     # meet frames of threads that exist in the parent only.
     gc.freeze()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who interrupts means the parent, which ends its workers
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # an interruption is meant for the parent, which ends its workers
     for index in own:
         try:
             answer = (index, function(items[index]), None)
@@ -71,7 +73,7 @@ def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Iterable[in
 def each(
     function: Callable[[Item], Result], items: Iterable[Item], pool: ThreadPoolExecutor | None = None
 ) -> Iterator[Result]:
-    """Results in the order of the items, made in the pool's threads a few ahead of who takes them: neither items nor results gather."""
+    """Results in the order of the items, computed in the pool's threads a few ahead of the consumer, so that neither items nor results accumulate."""
     if pool is None:
         yield from map(function, items)
         return
@@ -87,13 +89,13 @@ def each(
 def fork_map(
     function: Callable[[Item], Result], items: Sequence[Item], workers: int | None = None
 ) -> Iterator[tuple[int, Result | Exception]]:
-    """Results as they come, each with the index of its item. InputErrors are results; any other failure is raised.
+    """Results as they are finished, each with the index of its item. InputErrors are results; any other failure is raised.
 
-    The rest of a worker that is killed, by a lack of memory for instance, goes to a new one; RuntimeError is raised
-    where the same item takes that one, too.
+    If a worker is killed, for example by a lack of memory, a new one takes its remaining items. RuntimeError is raised
+    if the same item kills that one, too.
     """
     count = min(workers or cores(), len(items))
-    within = multiprocessing.current_process().daemon  # a worker, which may have none of its own
+    within = multiprocessing.current_process().daemon  # a worker, which may not start its own workers
     if count <= 1 or within or "fork" not in multiprocessing.get_all_start_methods():
         for index, item in enumerate(items):
             try:
@@ -123,7 +125,7 @@ def fork_map(
                 process, left = running[pipe]
                 try:
                     index, result, error = pipe.recv()
-                except (EOFError, OSError):  # nothing more, or killed amid an answer
+                except (EOFError, OSError):  # finished, or killed during an answer
                     process.join()
                     del running[pipe]
                     if left and left[0] in fatal:
@@ -146,10 +148,10 @@ def fork_map(
 def fork_each(
     function: Callable[[Item], Result], items: Sequence[Item], workers: int | None = None, lifetime: int = 8
 ) -> Iterator[tuple[int, Result | Exception]]:
-    """As `fork_map`, for items that take long and must not harm one another; every failure is a result.
+    """As `fork_map`, for long items that must not affect one another; every failure is a result.
 
-    Whoever is free takes the next item. A process ends after `lifetime` items, which gives back what memory has gathered. An item whose
-    process is killed is tried once more; a RuntimeError that tells the signal is its result where that process is killed, too.
+    A free process takes the next item. A process ends after `lifetime` items, which frees its memory. An item whose
+    process is killed is tried once more. If that process is killed, too, the result is a RuntimeError that names the signal.
     """
     if multiprocessing.current_process().daemon or "fork" not in multiprocessing.get_all_start_methods():
         yield from fork_map(function, items, 1)
@@ -172,7 +174,7 @@ def fork_each(
     def hand_on(pipe: Any, process: Any, left: int) -> None:
         if waiting and left:
             running[pipe] = (process, waiting.popleft(), left - 1)
-            with suppress(OSError):  # killed while idle: seen when it is listened to
+            with suppress(OSError):  # killed while idle, which shows when its answer is read
                 pipe.send(running[pipe][1])
             return
         with suppress(OSError):

@@ -1,4 +1,4 @@
-"""Progress of long work: whoever carries it out is handed a function that is told what begins."""
+"""Progress of long work: the worker gets a function that it calls at the beginning of each step."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -6,18 +6,18 @@ from typing import TypeVar
 
 Tell = Callable[[str], None]
 Item = TypeVar("Item")
-PAUSE = 5.0  # s between two words on how far work of many parts has come, at least
+PAUSE = 5.0  # s, smallest time between two reports on the progress of many parts
 
 
 def silent(_: str) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 def counted(
     parts: Iterable[Item], count: int, what: str, tell: Tell, now: Callable[[], float] = time.monotonic
 ) -> Iterator[Item]:
-    """The parts of some work as they are done, `count` in all, telling now and then how many are and how long the rest will take if
-    it goes on like this; `now` is a clock [s]."""
+    """The parts of some work, `count` in all, with an occasional report of how many are done and how long the rest will take at the
+    present rate; `now` is a clock [s]."""
     begun = told = now()
     for done, part in enumerate(parts, start=1):
         if done < count and now() - told >= PAUSE:

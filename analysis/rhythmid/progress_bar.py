@@ -1,7 +1,7 @@
 """Progress on the terminal: what is under way and for how long, and how much of a given time is spent.
 
-How long a search will take is not known beforehand, so no bar pretends to know: there is one only where a time is given, and it
-shows how much of that is spent.
+The length of a search is not known in advance. So there is a bar only if a budget is given, and it shows the share of the
+budget that has passed.
 """
 
 import time
@@ -45,7 +45,7 @@ class SpentText(ProgressColumn):
 
 
 def spent_words(elapsed: float, seconds: float) -> str:
-    """How much of a budget [s] is spent after `elapsed` [s]. What an answer needs is done all the same."""
+    """How much of a budget [s] is spent after `elapsed` [s]. Steps that an answer needs are done in any case."""
     if elapsed >= seconds:
         return f"{seconds:g} s spent; finishing"
     return f"{100.0 * elapsed / seconds:.0f} % of {seconds:g} s spent"

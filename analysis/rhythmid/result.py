@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 Row = Mapping[str, Any]
-WIDTH = 80  # characters of a line of text where nobody says otherwise
-ESTIMATE = ("value", "std", "unit")  # columns that are shown as one: value ± half of the 95 % interval
+WIDTH = 80  # default number of characters of a line
+ESTIMATE = ("value", "std", "unit")  # columns that are shown together: value ± half of the 95 % interval
 
 
 class Result(ABC):
@@ -59,12 +59,12 @@ class Result(ABC):
         Parameters
         ----------
         table
-            Name of the table; the main one where None.
+            Name of the table; None for the main one.
 
         Raises
         ------
         InputError
-            Where there is no such table, or pandas is not installed.
+            If there is no such table, or pandas is not installed.
         """
         known = self.tables()
         name = next(iter(known)) if table is None else table
@@ -112,7 +112,7 @@ def optional(package: str, method: str) -> Any:
 
 
 def legend_above(axis: "Axes") -> None:
-    """The legend in a line above the axis, where it hides no curve."""
+    """The legend in a line above the axis, so that it hides no curve."""
     axis.legend(
         loc="lower left",
         bbox_to_anchor=(0.0, 1.0),

@@ -1,4 +1,4 @@
-"""What a running graph needs besides this package, said in one line where it is missing."""
+"""Packages that a running graph needs besides this one; a missing package is reported in one line."""
 
 from rhythmid.errors import InputError
 
@@ -9,5 +9,5 @@ INSTALL = (
 
 
 def not_installed(what: str, package: str) -> InputError:
-    """That `what` cannot be done for want of a package, and how to install it."""
+    """Message that `what` is not possible without a package, and how to install it."""
     return InputError(f"{what} needs ROS 2 and rhythmid's nodes: {package} is not installed; {INSTALL}")

@@ -16,7 +16,7 @@ from rhythmid.validation import Number, Range, Whole
 Topic = Literal[
     "excitation", "command", "forcing", "plant/joint_states", "joint_states", "run", "diagnostics"
 ]
-KEYS = ConfigDict(extra="forbid")  # a key that is not known is a mistake
+KEYS = ConfigDict(extra="forbid")  # an unknown key is an error
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Delay:
         return times, delays
 
     def release(self, stamp_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Stamps [ns] on release: stamp + delay, in order (nothing overtakes). Shapes (n,) -> (n,)."""
+        """Stamps [ns] on release: stamp + delay, in order (no message overtakes another). Shapes (n,) -> (n,)."""
         released = stamp_ns + profile_delay(stamp_ns, *self.table())
         order = np.arange(len(released), dtype=np.int64)
         return np.maximum.accumulate(released - order) + order
@@ -56,7 +56,7 @@ class Delay:
 def profile_delay(
     since_ns: NDArray[np.int64] | int, times: NDArray[np.float64], delays: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Delay [ns] of what is stamped `since_ns` [ns] after the start, by a profile's corner times and delays [s]."""
+    """Delay [ns] of a message with a stamp `since_ns` [ns] after the start, by a profile's corner times and delays [s]."""
     return np.rint(np.interp(np.multiply(since_ns, 1e-9), times, delays) * 1e9).astype(np.int64)
 
 
@@ -91,9 +91,9 @@ class TimeMode:
 class Safety:
     """Limits of a run. The effort never exceeds `max_effort` [N]; it fades in and out over `ramp` [s].
 
-    The excitation stops by itself when the newest measurement is older than `stale_after` [s], two successive ones lie further apart
+    The excitation stops by itself if the newest measurement is older than `stale_after` [s], two successive stamps differ by more
     than `max_gap` [s] (0: as `stale_after`), the position leaves `envelope` [m] or does not change for `frozen_after` [s]
-    (0: never looked at), or the speed exceeds `max_speed` [m/s]. A command that nobody renews ends after `command_timeout` [s] (0: never).
+    (0: not checked), or the speed exceeds `max_speed` [m/s]. A command that is not renewed ends after `command_timeout` [s] (0: never).
     """
 
     __pydantic_config__ = KEYS

@@ -77,9 +77,9 @@ CASES = (  # Paper, Table 1; milliseconds
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """What one experiment gave: `result` is the dictionary of `identify --json` with the actual delays added, `fitted` the
+    """Result of one experiment: `result` is the dictionary of `identify --json` with the actual delays added, `fitted` the
     parameters that the paper's method found; `magnitude` and `phase` are the curves of the two figures by harmonic, None
-    where they are not drawn."""
+    if they are not drawn."""
 
     case: Case
     result: dict[str, Any]
@@ -89,7 +89,7 @@ class Row:
 
 
 def record_case(case: Case, path: Path) -> None:
-    """Perform one experiment and write its bag: what a user of the robot sees, and nothing of the truth."""
+    """Perform one experiment and write its bag with what a user of the robot sees, without the true values."""
     with as_file(files("rhythmid") / "models") as folder:
         experiment = Experiment.from_text(
             EXPERIMENT.format(input=case.input, measurement=case.measurement), folder
@@ -103,7 +103,7 @@ def record_case(case: Case, path: Path) -> None:
 
 
 def curves(found: Identification) -> tuple[dict[int, list[Curve]], dict[int, list[Curve]]]:
-    """Curves of Figures 2 and 3: theory, estimate, parametric fit; the estimate compensated by the delays found."""
+    """Curves of Figures 2 and 3: theory, estimate, parametric fit; the estimate compensated by the estimated delays."""
     paper = found.paper[0]
     htf = paper.estimate.htf
     theory = theoretical_htf(paper_hopper(), paper.pumping, htf.harmonics, htf.frequency, delays=False)
@@ -129,7 +129,7 @@ def run_case(case: Case, folder: Path) -> Row:
     """Simulate, record to `folder`, and identify from the bag alone."""
     path = folder / f"experiment_{case.number}"
     record_case(case, path)
-    with threadpool_limits(1):  # each core has an experiment of its own
+    with threadpool_limits(1):  # one experiment per core
         found = identify(read_record(path))
     result = found.to_dict() | {"actual": {"input": case.input, "measurement": case.measurement}}
     fit = found.paper[0].fit
@@ -163,7 +163,7 @@ def _pair(ours: float, paper: float) -> str:
 
 
 def show(rows: Sequence[Row], console: Console) -> None:
-    """Print both tables: the paper's method, ours beside its, and joint maximum likelihood."""
+    """Print both tables: the paper's method (our values and the paper's), and joint maximum likelihood."""
     _show_paper(rows, console)
     _show_joint(rows, console)
 

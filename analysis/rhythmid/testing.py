@@ -1,4 +1,4 @@
-"""Integration tests of nodes of yours: pytest fixtures that run the graph in simulated time around them.
+"""Integration tests of your own nodes: pytest fixtures that run the graph in simulated time with them.
 
     pytest_plugins = ["rhythmid.testing"]
 
@@ -6,8 +6,8 @@
         run = run_graph("experiment.yaml", replace={"command_delay": "python my_filter.py"})
         assert run.identify().delays.input.value == pytest.approx(0.012, abs=1e-4)
 
-Each run is `rhythmid run` as a process with a DDS domain of its own: tests may run side by side (pytest-xdist), and the process
-of the tests needs no ROS. docs/testing.md says what a node must do in simulated time.
+Each run is `rhythmid run` in a process with its own DDS domain. Tests may run in parallel (pytest-xdist), and the test process
+needs no ROS. docs/testing.md says what a node must do in simulated time.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:  # slow to load, and pytest loads this module for tests that need none of it
+if TYPE_CHECKING:  # slow to load, and pytest loads this module also for tests that do not need it
     from rhythmid.diagnose.answer.result import Diagnosis
     from rhythmid.identify.identification import Identification
     from rhythmid.record.columns import Columns
@@ -40,14 +40,14 @@ STREAMS = ("excitation", "command", "forcing", "plant/joint_states", "joint_stat
 
 @dataclass(frozen=True)
 class GraphRun:
-    """A run that came to its end.
+    """A completed run.
 
     Attributes
     ----------
     bag : the recording.
-    said : what `rhythmid run` printed.
+    said : output of `rhythmid run`.
     namespace, joint : of the experiment.
-    folder : where names of model files start.
+    folder : folder to which names of model files are relative.
 
     Topics are named as in the experiment (`command`, `joint_states`), or in full.
     """
@@ -92,7 +92,7 @@ class GraphRun:
     def diagnose(self, model: str | Path = PAPER_HOPPER, budget: float | None = None) -> Diagnosis:
         """Verdict about the nominal `model`, by default the paper's hopper: what `rhythmid diagnose` says.
 
-        `budget` [s] bounds the diagnosis. Raises InputError.
+        `budget` [s] limits the time of the diagnosis. Raises InputError.
         """
         from rhythmid.diagnose.diagnosis import diagnose
         from rhythmid.model import Model
@@ -126,7 +126,7 @@ RunGraph = Callable[..., GraphRun]
 
 @pytest.fixture
 def run_graph(request: pytest.FixtureRequest, tmp_path: Path) -> RunGraph:
-    """A function that runs an experiment to its end, with nodes of yours in the place of some of the graph's.
+    """A function that runs an experiment to its end, with your own nodes in the place of some nodes of the graph.
 
     Parameters of the function
     --------------------------
@@ -163,13 +163,13 @@ def run_graph(request: pytest.FixtureRequest, tmp_path: Path) -> RunGraph:
 
 
 def _completed(experiment: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """An experiment with a model that is found from anywhere, and with all streams recorded."""
+    """An experiment with an absolute model path, and with all streams recorded."""
     model = folder / experiment["model"] if "model" in experiment else PAPER_HOPPER
     return {"record": {"topics": list(STREAMS)}, **experiment, "model": str(model)}
 
 
 def _run(words: list[str], replace: Mapping[str, str], folder: Path, timeout: float) -> str:
-    """What `rhythmid` printed; fails the test when it does not end well within `timeout` seconds."""
+    """Output of `rhythmid`; the test fails if it does not succeed within `timeout` seconds."""
     environment = {key: value for key, value in os.environ.items() if key != "ROS_DOMAIN_ID"}
     environment["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), environment.get("PATH", "")])
     for name, line in replace.items():
@@ -189,7 +189,7 @@ def _run(words: list[str], replace: Mapping[str, str], folder: Path, timeout: fl
             process.kill()
             said, _ = process.communicate()
         pytest.fail(f"the run did not end within {timeout:g} s:\n{said}")
-    except BaseException:  # such as the user's Ctrl-C: no node outlives the test
+    except BaseException:  # such as the user's Ctrl-C: no node may outlive the test
         process.send_signal(signal.SIGINT)
         process.wait(GRACE)
         raise

@@ -1,6 +1,6 @@
 """Units as products of powers: rad/s^2*s^2/rad is 1.
 
-A library of units would take half a second to import, and refuses what is none of its own, such as px or duty.
+A library of units takes half a second to import, and refuses units that it does not know, such as px or duty.
 """
 
 import re
@@ -10,7 +10,7 @@ TOKEN = re.compile(r"([^\W\d_]+|1)(?:\^(-?\d+))?|([*/()](?!\^))")
 
 
 def reduced(unit: str) -> str:
-    """The unit with each name once, where one stands in it several times; else as it is, and so is what is no product of powers."""
+    """The unit with every name only once. A text that is not a product of powers is returned unchanged."""
     names = re.findall(r"[^\W\d_]+", unit)
     powers = _powers(unit)
     if powers is None or len(set(names)) == len(names):
@@ -26,7 +26,7 @@ def _power(name: str, power: int) -> str:
 
 
 def _powers(unit: str) -> dict[str, int] | None:
-    """The power of each name, in order; None where the text is no product of names."""
+    """The power of each name, in order; None if the text is not a product of names."""
     found: dict[str, int] = {}
     signs = [1]  # of what stands in each pair of brackets that is open
     sign, factor = 1, True  # of the next factor, and whether one is due
@@ -48,7 +48,7 @@ def _powers(unit: str) -> dict[str, int] | None:
 
 
 def _tokens(unit: str) -> Iterator[tuple[str, str, str]]:
-    """Name, power and mark of each part; a mark that is none where the text is no unit."""
+    """Name, power and mark of each part; an invalid mark if the text is not a unit."""
     at = 0
     while at < len(unit):
         match = TOKEN.match(unit, at)

@@ -1,7 +1,7 @@
 """Units: a machine is translational (kg, m, N), rotational (kg*m^2, rad, N*m) or scaled otherwise (V, px, …).
 
-Elements write their units for a translational machine. `Units` translates them and refuses what does not match:
-nothing is converted silently, because a factor of 1000 in a model file is a mistake more often than a wish.
+Elements declare their units for a translational machine. `Units` translates them and refuses units that do not match.
+Nothing is converted silently, because a factor of 1000 in a model file is usually a mistake.
 """
 
 import re
@@ -14,7 +14,7 @@ from rhythmid.unit_powers import reduced
 
 @lru_cache(maxsize=1)
 def _registry():
-    import pint  # half a second to import, and needed only when a unit is not spelled as we spell it
+    import pint  # half a second to import, and needed only for other spellings of a unit
 
     return pint.UnitRegistry()
 
@@ -57,7 +57,7 @@ class Units:
             given_unit, wanted_unit = (_registry().Quantity(1.0, _plain(unit)) for unit in (given, wanted))
             ratio = given_unit / wanted_unit
             factor = float(ratio.m_as("dimensionless")) if ratio.dimensionless else None
-        except Exception:  # text that is no unit makes the parser fail in many ways
+        except Exception:  # the parser fails in many ways for text that is not a unit
             raise InputError(f"{problem} (it is not a unit that is known)") from None
         if factor is None:
             raise InputError(f"{problem}: they measure different things")
@@ -66,7 +66,7 @@ class Units:
 
 
 def mass_unit(force: str, position: str) -> str:
-    """The unit of an inertia: of the force over that of an acceleration."""
+    """The unit of an inertia: that of force divided by that of acceleration."""
     return reduced(f"{force}*s^2/{position}")
 
 

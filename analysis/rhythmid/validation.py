@@ -1,7 +1,7 @@
-"""The values of a document checked against the type that they are read into, so that a complaint names file, line and key.
+"""Validation of a document's values against the type that they are read into. Error messages name file, line and key.
 
-A type is a dataclass or pydantic model whose fields say what is allowed (`Annotated[Number, Field(ge=0)]`). Every file that a
-user writes is read through `validated`: what has to be checked of a value stands in its type, once.
+A type is a dataclass or pydantic model whose fields state what is allowed (`Annotated[Number, Field(ge=0)]`). Every file of a
+user is read through `validated`, so that the checks of a value are stated once, in its type.
 """
 
 import math
@@ -18,7 +18,7 @@ UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
 
 def _numeric(value: Any) -> Any:
-    """YAML 1.1 reads 1e-3 as text, and pydantic a truth value as a number."""
+    """Needed because YAML 1.1 reads 1e-3 as text, and pydantic reads a truth value as a number."""
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"a number is expected, not {value!r}")
     try:
@@ -52,11 +52,11 @@ Number = Annotated[float, BeforeValidator(_numeric), Field(allow_inf_nan=False)]
 End = Annotated[float, BeforeValidator(_numeric)]  # of a range, which may be open
 Whole = Annotated[int, BeforeValidator(_numeric)]
 Range = Annotated[tuple[End, End], BeforeValidator(_two), AfterValidator(_rising)]
-Word = Annotated[str, BeforeValidator(_word)]  # text that YAML may take for a number, such as the unit 1
+Word = Annotated[str, BeforeValidator(_word)]  # text that YAML may read as a number, such as the unit 1
 
 
 def by_shape(value: Any) -> str:
-    """Tag of a value that is either a mapping or something plain."""
+    """Tag of a value that is either a mapping or a plain value."""
     return "mapping of keys" if isinstance(value, Mapping) else "plain value"
 
 
@@ -93,7 +93,7 @@ def _refuse(node: Node, wanted: TypeAdapter[Any], error: Any) -> NoReturn:
 
 
 def _problem(kind: str, found: Any, limits: Mapping[str, Any], message: str) -> str:
-    """What is wrong with a value, in our words where pydantic's would not tell a user of the file what to write."""
+    """What is wrong with a value; pydantic's message is replaced if it does not say what to write."""
     if kind == "value_error":
         return message.removeprefix("Value error, ")
     if kind in ("literal_error", "union_tag_invalid"):

@@ -1,4 +1,4 @@
-"""A parameter's value in a model: what is known of it, and how a file writes it."""
+"""A parameter's value in a model: what is known about it, and its form in a file."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from rhythmid.validation import NUMBER, Number, Range, Word, validated
 
 @dataclass(frozen=True)
 class Prior:
-    """Gaussian knowledge of a parameter before the data."""
+    """Gaussian prior of a parameter."""
 
     __pydantic_config__ = ConfigDict(extra="forbid")
     mean: Number

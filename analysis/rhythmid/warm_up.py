@@ -1,9 +1,9 @@
-"""Compile ahead what the first simulation, identification and diagnosis of the paper's hopper need; `make install` does.
+"""Compile in advance the code for the first simulation, identification and diagnosis of the paper's hopper; used by `make install`.
 
     python -m rhythmid.warm_up
 
-A short run of each goes through the code that a user will call, so that nothing has to be listed here. The machine code is
-kept (see `rhythmid.simulation.machine_code.cache_folder`); a second warm-up takes some seconds.
+A short run of each uses the same code as a user's call, so that no list of functions is needed. The machine code is
+cached (see `rhythmid.simulation.machine_code.cache_folder`); a second warm-up takes some seconds.
 """
 
 import sys
@@ -58,7 +58,7 @@ def _diagnose(record: Record) -> None:
 
 
 def main() -> None:
-    """Warm up, and say so in one line."""
+    """Warm up, and report it in one line."""
     print("compiling the standard models, once ...", end=" ", flush=True)
     started = time.monotonic()
     try:

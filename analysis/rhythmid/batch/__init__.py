@@ -1,4 +1,4 @@
-"""Many recordings answered by one manifest, and compared; `rhythmid.batch(...)` calls `batch.batch.batch`."""
+"""Many recordings analysed by one manifest, and compared; `rhythmid.batch(...)` calls `batch.batch.batch`."""
 
 from rhythmid.callable_package import make_callable
 

@@ -13,9 +13,7 @@ from rhythmid.batch.scatter import Slope, groups_agree, holm, homogeneous, rando
 from rhythmid.batch.task import Task
 from rhythmid.report.quantity import pretty_name
 
-LEVEL = (
-    0.05  # chance that any parameter of a batch is said to differ where there is nothing but the stated noise
-)
+LEVEL = 0.05  # probability that any parameter of a batch is reported to differ although there is only the stated noise
 UNITS = (
     (86400.0, "day"),
     (3600.0, "h"),
@@ -23,12 +21,12 @@ UNITS = (
     (1.0, "s"),
 )  # of time, the longest that the runs span twice
 Verdict = Literal["agrees", "differs", "too few runs"]
-RUN = "run"  # unit of time where no clock tells it: the number of the run
+RUN = "run"  # unit of time if no clock gives it: the number of the run
 
 
 @dataclass(frozen=True)
 class Run:
-    """One estimate of a parameter; `time` in seconds from 1970, None where the clock does not tell."""
+    """One estimate of a parameter; `time` in seconds from 1970, None if the clock does not give it."""
 
     task: Task
     value: float
@@ -43,12 +41,12 @@ class Agreement:
     Attributes
     ----------
     subject : command, model, signals and joint, and for diagnoses the effects that are named, in words.
-    runs, left_out : estimates that are compared; number of those that are not, without value or standard deviation.
+    runs, left_out : estimates that are compared; number of estimates without value or standard deviation.
     groups : rigs among them.
-    mean, std, between : random-effects mean, its standard deviation, and the scatter τ beyond what the runs state [unit].
+    mean, std, between : random-effects mean, its standard deviation, and the scatter τ beyond the stated standard deviations [unit].
     birge : square root of Cochran's Q per degree of freedom within the rigs: 1 where the stated intervals are right.
-    runs_p, groups_p, slope : tests of the runs of each rig against what they state, of the rigs against their runs, and of a trend over
-        `per`; None where they cannot be made. Where each rig has but one run, `runs_p` is that of all runs.
+    runs_p, groups_p, slope : tests of the runs of each rig against their stated intervals, of the rigs against their runs, and of a trend over
+        `per`; None if they cannot be made. If each rig has only one run, `runs_p` is that of all runs.
     different : which of "run to run", "rig to rig" and "trend" are significant, all tests of the batch considered.
     """
 
@@ -84,7 +82,7 @@ class Agreement:
 
 
 def agreements(answers: Iterable[tuple[Task, Answered]]) -> tuple[Agreement, ...]:
-    """Every estimated parameter of the answers, compared; answers that were not identified do not count, nor do copies of a recording."""
+    """Compare every estimated parameter of the answers. Answers that are not usable and copies of a recording do not count."""
     answers = tuple(answers)
     twice = copies(answers)
     runs: dict[tuple[str, str, str], list[Run]] = defaultdict(list)
@@ -107,7 +105,7 @@ def agreements(answers: Iterable[tuple[Task, Answered]]) -> tuple[Agreement, ...
 
 
 def copies(answers: Iterable[tuple[Task, Answered]]) -> dict[Task, Task]:
-    """Answers to a recording that was answered already under another name, each with the first one to the same content and question."""
+    """Answers to copies of a recording, each with the first answer to the same content and question."""
     first: dict[tuple[object, ...], Task] = {}
     found: dict[Task, Task] = {}
     for task, answered in answers:
@@ -121,7 +119,7 @@ def copies(answers: Iterable[tuple[Task, Answered]]) -> dict[Task, Task]:
 
 
 def subject(task: Task, answered: Answered) -> str:
-    """What is compared with what: only estimates of the same model from the same channels are."""
+    """Key of the estimates that are compared: those of the same model from the same channels."""
     effects = [f"with {' and '.join(map(pretty_name, answered.missing))}"] if answered.missing else []
     return " · ".join(
         [task.command, *(one for one in (*task.labels, task.joint, task.variant) if one), *effects]
@@ -156,7 +154,7 @@ def _compared(key: tuple[str, str, str], runs: Sequence[Run], without: int) -> A
 
 
 def _times(runs: Sequence[Run]) -> tuple[np.ndarray, str]:
-    """Times of the runs and their unit: of the recordings' clocks, or where one does not tell the numbers of the runs."""
+    """Times of the runs and their unit: from the recordings' clocks, or the numbers of the runs if one clock gives no time."""
     known = [run.time for run in runs if run.time is not None]
     if len(known) < len(runs):
         return np.arange(1.0, len(runs) + 1.0), RUN
@@ -166,7 +164,7 @@ def _times(runs: Sequence[Run]) -> tuple[np.ndarray, str]:
 
 
 def _judged(found: Sequence[Agreement]) -> tuple[Agreement, ...]:
-    """With what is significant at `LEVEL` in all tests of the batch together."""
+    """The same with the tests that are significant at `LEVEL` among all tests of the batch."""
     tests = [(number, name, p) for number, one in enumerate(found) for name, p in one.tests.items()]
     adjusted = holm([p for *_, p in tests])
     flagged = {(number, name) for (number, name, _), p in zip(tests, adjusted) if p < LEVEL}

@@ -1,4 +1,4 @@
-"""One task answered: what its command finds, as plain data and as a page."""
+"""The answer to one task: the result of its command, as plain data and as a page."""
 
 import resource
 import shlex
@@ -33,7 +33,7 @@ from rhythmid.report.page import Page, render
 
 KIBIBYTE = (
     1 if sys.platform == "darwin" else 1024
-)  # bytes in which the system counts the largest memory of a process
+)  # bytes per unit in which the system reports the largest memory of a process
 LONGEST_REASON = 300  # characters of a reason
 
 
@@ -53,15 +53,15 @@ class Answered:
 
     Attributes
     ----------
-    failure : why there is no answer, in one line; empty where there is one.
+    failure : why there is no answer, in one line; empty if there is one.
     headline : the answer in one sentence.
-    verdict : in one word: of a diagnosis its own, else "identified", "not identified", "usable".
+    verdict : in one word: that of a diagnosis, else "identified", "not identified", "usable".
     missing : effects that a diagnosis names.
-    time : when the recording began, in seconds from 1970; None where its clock does not tell.
-    seconds : that the answer took.
-    memory : the most that its process held [bytes].
+    time : when the recording began, in seconds from 1970; None if its clock does not give it.
+    seconds : time that the answer took.
+    memory : largest memory of its process [bytes].
     values : what was estimated or measured.
-    content : digest of what the recordings measured: answers that share it are of one recording and its copies.
+    content : digest of the measured samples. Answers with the same digest are those of one recording and its copies.
     result : the content of the command's `--json`.
     page : its report as HTML; not part of the JSON.
     """
@@ -93,11 +93,11 @@ def answer(task: Task) -> Answered:
     """The answer to a task, or the reason why there is none."""
     began = time.perf_counter()
     try:
-        with threadpool_limits(1):  # as many answers are sought at a time as there are processors
+        with threadpool_limits(1):  # one answer per processor at a time
             found = COMMANDS[task.command](task)
     except InputError as error:
         found = failed(str(error))
-    except Exception as error:  # one recording must not take the others' answers with it
+    except Exception as error:  # a failure of one recording must not affect the other answers
         found = failed(f"{type(error).__name__}: {error}")
     memory = KIBIBYTE * float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
     return replace(found, seconds=time.perf_counter() - began, memory=memory)
@@ -112,7 +112,7 @@ def failed(reason: str) -> Answered:
 
 
 def command_line(task: Task) -> str:
-    """The single command that finds the same answer."""
+    """The single command that gives the same answer."""
     words = ["rhythmid", task.command, *map(str, task.sources)]
     words += [] if task.signals is None else ["--signals", str(task.signals)]
     words += [] if task.model is None else ["--model", str(task.model)]
@@ -141,13 +141,13 @@ def _signals(task: Task) -> Signals | None:
 
 
 def _records(task: Task) -> tuple[list[Record], list[Record]]:
-    """Records to fit and to judge by."""
+    """Records for the fit, and held-out records."""
     signals = _signals(task)
     return load_records(task.sources, signals), load_records(task.holdout, signals)
 
 
 def _joint_records(task: Task) -> tuple[list[JointRecord], list[JointRecord]]:
-    assert task.signals is not None  # the manifest was refused otherwise
+    assert task.signals is not None  # otherwise the manifest was refused
     signals = JointSignals.load(task.signals)
     return load_joint_records(task.sources, signals), load_joint_records(task.holdout, signals)
 

@@ -1,4 +1,4 @@
-"""Many recordings answered, kept, compared, and shown as one."""
+"""Many recordings analysed; their answers are stored, compared and shown together."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -31,9 +31,9 @@ class Batch(Result):
 
     Attributes
     ----------
-    answers : every task of the manifest, in its order, with its answer, or with the reason why there is none.
+    answers : every task of the manifest, in its order, with its answer or the reason of its failure.
     agreements : every parameter that several answers estimate, compared.
-    folder : that keeps the answers, the table and the index page.
+    folder : folder with the answers, the table and the index page.
 
     Examples
     --------
@@ -51,12 +51,12 @@ class Batch(Result):
 
     @property
     def copies(self) -> dict[Task, Task]:
-        """Answers to a copy of a recording, each with the answer that counts instead."""
+        """Answers to copies of a recording, each with the answer that counts in the comparison."""
         return copies(self.answers)
 
     @property
     def headline(self) -> str:
-        """How many were answered, and which parameters do not agree."""
+        """How many recordings were analysed, and which parameters do not agree."""
         count, failed = len(self.answers), len(self.failures)
         answered = f"{count - failed} of {count} answered" if failed else f"{count} answered"
         if twice := len(self.copies):
@@ -103,13 +103,13 @@ class Batch(Result):
 
         Parameters
         ----------
-        axis : Matplotlib axis; one of a new figure where None.
-        parameter : its name, "element.parameter"; the first that was compared where None.
+        axis : Matplotlib axis; if None, an axis of a new figure.
+        parameter : its name, "element.parameter"; if None, the first one that was compared.
 
         Raises
         ------
         InputError
-            Where no answer estimates it.
+            If no answer estimates it.
         """
         known = [one for one in self.agreements if one.runs and parameter in (None, one.name)]
         if not known:
@@ -133,28 +133,28 @@ def batch(
     tell: Tell = silent,
     command: str = "",
 ) -> Batch:
-    """Answer every recording of a manifest, and compare the answers.
+    """Analyse every recording of a manifest, and compare the answers.
 
-    Answers that `out` keeps are not sought again, unless the recording, model, signals or options have changed.
+    Answers that are stored in `out` are not computed again, unless the recording, model, signals or options have changed.
 
     Parameters
     ----------
     manifest : a manifest file, or its content as a mapping with paths relative to the working directory.
     out : folder for answers, `table.csv`, `table.parquet` (with pyarrow) and `index.html`; NAME_batch if not given.
-    jobs : processes that work at a time; as many as there are processors if not given.
-    scheduler : address of a Dask scheduler whose workers answer instead; they must see the same paths.
-    tell : is told how far it has come.
+    jobs : number of parallel processes; by default the number of processors.
+    scheduler : address of a Dask scheduler whose workers do the work instead; they must see the same paths.
+    tell : function that is called with the progress.
     command : the command line, for the index page.
 
     Returns
     -------
     Batch
-        With a reason in the place of the answer where a recording could not be answered.
+        With the reason in the place of the answer if a recording could not be analysed.
 
     Raises
     ------
     InputError
-        For a manifest, model or signals file that is wrong, and for an `out` that holds something else.
+        For an error in the manifest, a model or a signals file, and for an `out` that holds something else.
 
     Examples
     --------

@@ -14,9 +14,9 @@ YAML = (".yaml", ".yml")
 
 
 class Fingerprint:
-    """Digests of files below, or named relative to, one folder. Each file is looked at once.
+    """Digests of files below, or named relative to, one folder. Each file is read once.
 
-    Files of text count by their content. Recordings, which may be large, count by name, size and time of the last change.
+    Text files are compared by their content. Recordings, which may be large, are compared by name, size and time of the last change.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -60,7 +60,7 @@ class Fingerprint:
 
 
 def _files_named(node: Node, folder: Path) -> Iterator[Path]:
-    """Files that exist under a name that stands in a document."""
+    """Existing files whose names occur in a document."""
     if isinstance(node.value, (dict, list)):
         inner = node.value.values() if isinstance(node.value, dict) else node.value
         for one in inner:
@@ -69,5 +69,5 @@ def _files_named(node: Node, folder: Path) -> Iterator[Path]:
         try:
             if (folder / node.value).is_file():
                 yield folder / node.value
-        except (OSError, ValueError):  # text that can be no file's name
+        except (OSError, ValueError):  # text that cannot be a file name
             return

@@ -1,4 +1,4 @@
-"""Answers that are kept in files, each as soon as it is there, so that a batch can go on where it was interrupted."""
+"""Storage of answers in files, each as soon as it is finished, so that a batch can continue after an interruption."""
 
 import json
 import os
@@ -12,12 +12,12 @@ from rhythmid.batch.task import Task
 from rhythmid.errors import InputError
 from rhythmid.output import require_writable, write_json, write_text
 
-MARK = "rhythmid_batch.json"  # in every batch's folder: nothing else is written to
+MARK = "rhythmid_batch.json"  # marks the folder of a batch; other folders are not written to
 ANSWERS = "answers"
 
 
 class Kept:
-    """The folder of a batch. Each answer has a JSON file and a page; the JSON is written last, so where it is the answer is whole.
+    """The folder of a batch. Each answer has a JSON file and a page. The JSON is written last, so that an answer with a JSON file is complete.
 
     Raises InputError for a folder that holds something else.
     """
@@ -39,7 +39,7 @@ class Kept:
             write_json(self.folder / MARK, {"program": "rhythmid", "content": "answers of a batch"})
 
     def get(self, task: Task) -> Answered | None:
-        """The answer to a task without page and result, None where there is none yet."""
+        """The answer to a task without page and result, None if there is none yet."""
         try:
             content = json.loads(self._path(task, ".json").read_text(encoding="utf-8"))
             return brief(Answered.of(_of_task(content, task)))
@@ -47,7 +47,7 @@ class Kept:
             return None
 
     def put(self, task: Task, answered: Answered) -> None:
-        """Keep an answer. A task that failed is not kept: it is tried again."""
+        """Store an answer. A failed task is not stored, so that it is tried again."""
         if answered.failure:
             return
         write_text(self._path(task, ".html"), answered.page)
@@ -56,7 +56,7 @@ class Kept:
         )
 
     def page(self, task: Task) -> str:
-        """Where the page of an answer lies, relative to the folder, as a link."""
+        """Link to the page of an answer, relative to the folder."""
         return f"{ANSWERS}/{task.file}.html"
 
     def _path(self, task: Task, suffix: str) -> Path:
@@ -64,7 +64,7 @@ class Kept:
 
 
 def brief(answered: Answered) -> Answered:
-    """An answer without what only its own files need."""
+    """An answer without the parts that only its own files need."""
     return replace(answered, result=None, page="")
 
 

@@ -1,4 +1,4 @@
-"""The manifest of a batch: which recordings, joints and models are to be answered, by which command.
+"""The manifest of a batch: which recordings, joints and models to analyse, by which command.
 
     command: identify                  # identify | diagnose | check
     model: hopper.yaml                 # or a list, or {name: file, …}: every recording with each
@@ -7,7 +7,7 @@
       - {bags: "monday/*", group: rig A}
       - {bags: ["tuesday/*.mcap", extra/run7], group: rig B, options: {method: paper}}
 
-All keys but `bags` and `together` may stand above the entries, for those that do not say otherwise. Paths and globs are relative to the manifest.
+All keys except `bags` and `together` may stand above the entries, as defaults. Paths and globs are relative to the manifest.
 """
 
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ def _listed(value: Any) -> Any:
 
 
 def _named(value: Any) -> Any:
-    """Files by name: one that is given without a name is called as its file."""
+    """Files by name; a file that is given without a name has its file name."""
     given = _listed(value)
     if not isinstance(given, list) or not all(isinstance(one, str) for one in given):
         return given
@@ -75,7 +75,7 @@ class IdentifyOptions:
 
 @dataclass(frozen=True)
 class DiagnoseOptions:
-    """As the options of `rhythmid diagnose`: globs of records to judge by, and the budget of each answer [s]."""
+    """As the options of `rhythmid diagnose`: globs of held-out records, and the budget of each answer [s]."""
 
     __pydantic_config__ = KEYS
 
@@ -93,15 +93,15 @@ OPTIONS: Mapping[Command, TypeAdapter[Any]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Shared:
-    """What may be said of all entries at once. None: not said.
+    """Defaults of all entries. None: not given.
 
     Attributes
     ----------
-    group : the rig, or what else recordings are compared by.
-    command : that answers each recording.
-    model, signals : files by name; every recording is answered with each.
-    joints : those of a signals file with `joints:` that are answered; all where not said.
-    elements : folders with elements of one's own.
+    group : the rig, or another criterion of the comparison.
+    command : command that analyses each recording.
+    model, signals : files by name; every recording is analysed with each.
+    joints : those of a signals file with `joints:` that are analysed; all by default.
+    elements : folders with the user's own elements.
     options : of the command.
     """
 
@@ -118,7 +118,7 @@ class Shared:
 
 @dataclass(frozen=True, kw_only=True)
 class Entry(Shared):
-    """Recordings that are answered alike: each on its own, or all of them `together` in one answer. `place` is where it stands."""
+    """Recordings that are analysed in the same way: each separately, or all `together` in one answer. `place` is its line in the file."""
 
     bags: Several
     together: bool = False
@@ -131,7 +131,7 @@ class _Manifest(Shared):
 
 @dataclass(frozen=True)
 class Settled:
-    """An entry with all that the manifest says above it, its options, and its place in the file for complaints."""
+    """An entry with the defaults of the manifest, its options, and its place in the file for error messages."""
 
     entry: Entry
     command: Command

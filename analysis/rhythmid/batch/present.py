@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 Link = Callable[[Task], str]
 MEBIBYTE = 2.0**20
 NO_GROUP = "all runs"
-MOST_OPEN = 30  # answers up to which their lists are open
+MOST_OPEN = 30  # up to so many answers their lists are shown open
 
 
 def present(found: "Batch", link: Link, command: str = "") -> Page:
-    """The index page of a batch; `link` is where the page of a task's answer lies."""
+    """The index page of a batch; `link` gives the link to the page of a task's answer."""
     answered = [pair for pair in found.answers if not pair[1].failure]
     sections = [
         *_failed(found.failures),
@@ -231,7 +231,7 @@ def _listed(one: Agreement, link: Link) -> Fold:
 
 
 def _verdicts(answered: Sequence[tuple[Task, Answered]]) -> list[Section]:
-    """How often diagnoses say what, for each rig."""
+    """Verdicts and names of the diagnoses, counted for each rig."""
     diagnosed = [(task, one) for task, one in answered if task.command == "diagnose"]
     if not diagnosed:
         return []
@@ -251,7 +251,7 @@ def _said(one: Answered) -> str:
 
 
 def _answers(answered: Sequence[tuple[Task, Answered]], link: Link) -> Section:
-    """Every answer with a link to its report, folded by rig where there are many."""
+    """Every answer with a link to its report, folded by rig if there are many."""
     if not answered:
         return Section("All answers", (Paragraph("There is none."),))
     groups = dict.fromkeys(task.group for task, _ in answered)

@@ -1,7 +1,7 @@
-"""Whether repeated estimates agree: their scatter against the standard deviations that they state.
+"""Whether repeated estimates agree: their scatter compared with their stated standard deviations.
 
 All tests rest on one model: x_i = (X b)_i + r_i + e_i with e_i ~ N(0, s_i²) stated and r_i ~ N(0, τ²) from run to run. X holds a mean, a mean for
-each group, or such means and a slope. With nothing but the stated noise each p-value is uniform, whatever the number of runs.
+each group, or such means and a slope. With only the stated noise each p-value is uniform, whatever the number of runs.
 
 W. G. Cochran, Biometrics 10 (1954) 101 (Q); R. T. Birge, Phys. Rev. 40 (1932) 207 (ratio); R. C. Paule and J. Mandel, J. Res. NBS 87 (1982) 377
 (τ); G. Knapp and J. Hartung, Stat. Med. 22 (2003) 2693 (slope); S. Holm, Scand. J. Stat. 6 (1979) 65 (several tests at once).
@@ -32,7 +32,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class Slope:
-    """A linear trend: the change per unit of time, its standard error, the p-value of there being none, and its degrees of freedom."""
+    """A linear trend: the change per unit of time, its standard error, the p-value of no trend, and its degrees of freedom."""
 
     value: float
     std: float
@@ -47,7 +47,7 @@ class Slope:
 
 @dataclass(frozen=True)
 class Mean:
-    """A mean of runs whose scatter beyond their stated one is `between` (τ): random effects."""
+    """Mean of a random-effects model; `between` (τ) is the scatter beyond the stated standard deviations."""
 
     value: float
     std: float
@@ -68,7 +68,7 @@ def fit(design: Array, values: Array, stds: Array, between: float = 0.0) -> Fit:
 
 
 def between_runs(design: Array, values: Array, stds: Array) -> float:
-    """τ of Paule and Mandel: what has to be added to the stated noise so that Q is its degrees of freedom; 0 where it is less already."""
+    """τ of Paule and Mandel: the scatter that, added to the stated noise, makes Q equal to its degrees of freedom; 0 if Q is already smaller."""
 
     def excess(between: float) -> float:
         made = fit(design, values, stds, between)
@@ -84,7 +84,7 @@ def between_runs(design: Array, values: Array, stds: Array) -> float:
 
 
 def random_effects(values: Array, stds: Array) -> Mean:
-    """Mean over runs that may differ by more than they state."""
+    """Mean over runs that may differ by more than their stated standard deviations."""
     ones = np.ones((len(values), 1))
     between = between_runs(ones, values, stds)
     made = fit(ones, values, stds, between)
@@ -92,7 +92,7 @@ def random_effects(values: Array, stds: Array) -> Mean:
 
 
 def homogeneous(values: Array, stds: Array, groups: Sequence[str]) -> tuple[float, float] | None:
-    """Whether the runs of each group agree within what they state: Birge ratio and p-value of Cochran's Q; None without repeated runs."""
+    """Whether the runs of each group agree within their stated intervals: Birge ratio and p-value of Cochran's Q; None without repeated runs."""
     made = fit(_means(groups), values, stds)
     if made.freedom < 1:
         return None
@@ -100,9 +100,9 @@ def homogeneous(values: Array, stds: Array, groups: Sequence[str]) -> tuple[floa
 
 
 def groups_agree(values: Array, stds: Array, groups: Sequence[str]) -> float | None:
-    """p-value of groups that differ no more than their runs do: F of the weighted analysis of variance.
+    """p-value of the hypothesis that groups differ no more than their runs do: F of the weighted analysis of variance.
 
-    The runs' own scatter is the measure, so that one that is larger than stated does not make the groups differ. None for one group, or
+    The reference is the actual scatter of the runs, so that a scatter larger than stated does not make the groups differ. None for one group, or
     without repeated runs.
     """
     design = _means(groups)
@@ -116,7 +116,7 @@ def groups_agree(values: Array, stds: Array, groups: Sequence[str]) -> float | N
 
 
 def trend(values: Array, stds: Array, groups: Sequence[str], times: Array) -> Slope | None:
-    """Common slope of all groups over time, each group about a mean of its own; None where too few runs or times tell it.
+    """Common slope of all groups over time, with a mean for each group; None if there are too few runs or times.
 
     The standard error is scaled by the scatter about the line, and compared with Student's t.
     """
@@ -126,13 +126,13 @@ def trend(values: Array, stds: Array, groups: Sequence[str], times: Array) -> Sl
     made = fit(design, values, stds, between_runs(design, values, stds))
     slope = float(made.coefficients[-1])
     std = math.sqrt(float(made.covariance[-1, -1]) * made.left / made.freedom)
-    if std == 0.0:  # all on one line, which is level where the values are equal
+    if std == 0.0:  # all points on one line, which has slope 0 if the values are equal
         return Slope(slope, std, 0.0 if np.ptp(values) else 1.0, made.freedom)
     return Slope(slope, std, float(2.0 * t.sf(abs(slope) / std, made.freedom)), made.freedom)
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """p-values for several tests at once: the least one is below α by chance in no more than a share α of all cases, dependent or not."""
+    """p-values for several tests at once (Holm). The smallest is below α by chance in at most a share α of all cases, whether the tests are dependent or not."""
     order = np.argsort(p_values)
     steps = len(p_values) - np.arange(len(p_values))
     adjusted = np.empty(len(p_values))

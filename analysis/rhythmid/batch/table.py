@@ -15,7 +15,7 @@ NUMBERS = ("value", "std")  # columns that hold numbers; the others hold text
 
 
 def write_csv(path: Path, rows: Sequence[Row]) -> None:
-    """Write the rows whole or not at all; what is not known is empty."""
+    """Write all rows or none; unknown values are empty."""
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
@@ -24,7 +24,7 @@ def write_csv(path: Path, rows: Sequence[Row]) -> None:
 
 
 def write_parquet(path: Path, rows: Sequence[Row]) -> bool:
-    """Write the rows whole or not at all; what is not known is null. False, and nothing is written, where pyarrow is not installed."""
+    """Write all rows or none; unknown values are null. Returns False and writes nothing if pyarrow is not installed."""
     try:
         import pyarrow
         from pyarrow import parquet

@@ -1,4 +1,4 @@
-"""The tasks of a batch: one answer each, with a key that changes when anything does on which the answer depends."""
+"""The tasks of a batch: one answer each, with a key that changes with everything on which the answer depends."""
 
 import glob
 import re
@@ -26,17 +26,17 @@ LONGEST_TASK_NAME = 60  # characters of a task's name in a file's name
 
 @dataclass(frozen=True)
 class Task:
-    """One answer to be found.
+    """One answer to be computed.
 
     Attributes
     ----------
-    name : the recording, then the joint and what else tells it from other answers to the same recording; for people.
-    bag : the recording as the manifest finds it; several that are answered together are joined by " + ".
+    name : the recording, then the joint and whatever distinguishes it from other answers to the same recording; for people.
+    bag : the recording as found by the manifest; recordings that are analysed together are joined by " + ".
     group : the rig, or what else recordings are compared by.
-    sources, holdout : recordings to answer and to judge by.
-    model, signals, joint, elements : as for the command; `machine` where the model has several joints.
+    sources, holdout : recordings to analyse, and held-out recordings.
+    model, signals, joint, elements : as for the command; `machine` if the model has several joints.
     labels : names of model and signals in the manifest.
-    key : of everything on which the answer depends.
+    key : digest of everything on which the answer depends.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Task:
 
     @property
     def variant(self) -> str:
-        """Options of an identification that are not the usual ones, in words: answers that differ in them are not compared."""
+        """Options of an identification that differ from the defaults, in words. Answers that differ in these options are not compared."""
         if not isinstance(self.options, IdentifyOptions):
             return ""
         usual = asdict(IdentifyOptions())
@@ -174,7 +174,7 @@ def loaded(model: Path, machine: bool, catalogue: Catalogue) -> Model | Machine:
 
 
 def _key(task: Task, fingerprint: Fingerprint) -> str:
-    """Neither the group nor the labels count: they are not in the answer."""
+    """Group and labels are left out, because they are not in the answer."""
     options = [__version__, task.command, task.joint, asdict(task.options), len(task.sources)]
     texts = [path for path in (task.model, task.signals) if path is not None]
     texts += [file for folder in task.elements for file in sorted(folder.rglob("*.py"))]

@@ -3,7 +3,7 @@
 from rhythmid.batch.agreement import Agreement
 from rhythmid.report.quantity import NONE, number, plus_minus, pretty_unit, scaled, with_unit
 
-SMALLEST = 1e-4  # p-value below which only that is told
+SMALLEST = 1e-4  # smaller p-values are only stated to be below this
 
 
 def p_value(p: float | None) -> str:

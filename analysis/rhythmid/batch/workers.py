@@ -1,4 +1,4 @@
-"""Who answers the tasks of a batch: processes of this machine, or an existing Dask cluster."""
+"""What executes the tasks of a batch: processes on this computer, or an existing Dask cluster."""
 
 from collections.abc import Iterator, Sequence
 from itertools import islice
@@ -8,8 +8,8 @@ from rhythmid.batch.task import Task
 from rhythmid.errors import InputError
 from rhythmid.parallel import fork_each
 
-AHEAD = 2  # tasks a thread of the cluster that are handed over at once: one at work, one at hand
-CONNECT = "10s"  # for a scheduler to answer
+AHEAD = 2  # tasks that are submitted at once per thread of the cluster: one running, one waiting
+CONNECT = "10s"  # timeout for the answer of a scheduler
 
 Answers = Iterator[tuple[Task, Answered]]
 
@@ -23,8 +23,8 @@ def by_processes(tasks: Sequence[Task], jobs: int | None = None) -> Answers:
 def by_cluster(tasks: Sequence[Task], address: str) -> Answers:
     """Answers as they come, from the workers of the Dask scheduler at `address`; they must see the recordings under the same paths.
 
-    Tasks are handed over a few at a time, so that neither the scheduler nor this process gathers answers. The task of a worker that
-    dies goes to another one.
+    Tasks are submitted a few at a time, so that answers accumulate neither in the scheduler nor in this process. If a worker dies, its
+    task goes to another one.
 
     Raises InputError where Dask is not installed, or no scheduler or no worker is there.
     """

@@ -66,7 +66,7 @@ def check(
             with progress(terminal.progress, log=False) as tell:
                 tell(f"reading {bag}")
                 found = quality_report(bag, signals)
-        except InputError as error:  # is no recording at all: the others are told all the same
+        except InputError as error:  # not a recording; the others are reported nevertheless
             refused.append(str(error))
             continue
         made.append(found)

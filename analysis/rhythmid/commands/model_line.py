@@ -1,4 +1,4 @@
-"""A model file in one line, and whether records fit it: what `rhythmid check --model` says."""
+"""A model file in one line, and whether records fit it, for `rhythmid check --model`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -51,7 +51,7 @@ def model_lines(
 
 
 def _rests(records: Sequence["Record"], model: Model) -> str | None:
-    """That the machine rests during a share of these records, where they hold an effort and this is of practical size."""
+    """A note that the machine rests during a share of these records, if they contain an effort and the share is of practical size."""
     from rhythmid.identify.inverse_dynamics.balance import Balance
     from rhythmid.identify.inverse_dynamics.rests import told
 

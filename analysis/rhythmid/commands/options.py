@@ -29,5 +29,5 @@ Elements = Annotated[
 
 
 def command_line() -> str:
-    """This call of the command as it can be typed again."""
+    """This call of the command, in a form that can be typed again."""
     return shlex.join(["rhythmid", *sys.argv[1:]])

@@ -9,15 +9,15 @@ from rhythmid.output import STANDARD_OUTPUT
 if TYPE_CHECKING:
     from rich.console import Console
 
-WHOLE = 100_000  # columns where nobody says how many there are, as in a file: no line is that long
+WHOLE = 100_000  # columns if their number is unknown, as in a file: longer than any line
 
 
 class Terminal:
     """Consoles of one command.
 
-    `answer` prints the result, on standard error where standard output carries JSON; `progress` prints what is under way, on
-    standard error. Both are silent where the command is `quiet`. They break lines to the width of the terminal, or to COLUMNS; where
-    there is neither, each line is printed whole.
+    `answer` prints the result, on standard error if standard output carries JSON. `progress` prints the present step, on
+    standard error. Both are silent if the command is `quiet`. They break lines to the width of the terminal, or to COLUMNS. Without
+    either, lines are not broken.
     """
 
     def __init__(self, quiet: bool = False, json: Path | None = None) -> None:
@@ -30,7 +30,7 @@ class Terminal:
 
 
 def console(quiet: bool = False, stderr: bool = False) -> "Console":
-    """A console on standard output or standard error, as wide as whoever reads it."""
+    """A console on standard output or standard error, as wide as the terminal."""
     from rich.console import Console
 
     made = Console(quiet=quiet, stderr=stderr)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rhythmid.twin.twin import Status
     from rhythmid.twin.watch import Watch
 
-LIVE_GROUP = "rhythmid.live"  # entry points of packages that know how to reach a running robot
+LIVE_GROUP = "rhythmid.live"  # entry points of packages that can connect to a running robot
 LIVE = "watching a running machine (a recording is watched with --bag)"
 EXAMPLES = (
     "rhythmid watch model.yaml --signals signals.yaml",
@@ -118,7 +118,7 @@ def watch(
 
 
 class _Told:
-    """What a twin said of a bag: how long it watched, and its last delays."""
+    """Result of a twin on a bag: the length of the watch, and its last delays."""
 
     def __init__(self, watching: "Watch") -> None:
         self._watching = watching
@@ -147,7 +147,7 @@ class _Told:
 
 
 def _live(**options: Any) -> int:
-    """Watch the running machine through whatever package knows how; the exit code."""
+    """Watch the running machine with a package that can connect to it; returns the exit code."""
     known = {entry.name: entry for entry in entry_points(group=LIVE_GROUP)}
     if "watch" not in known:
         raise not_installed(LIVE, "rhythmid_bringup")

@@ -1,4 +1,4 @@
-"""CSV: one row a number of a joint, then one row a remark."""
+"""CSV: one row per number of a joint, then one row per remark."""
 
 import csv
 import io
@@ -10,7 +10,7 @@ HEADER = ("joint", "quantity", "value", "unit", "meaning")
 
 
 def text(joints: Sequence[Joint], source: str) -> str:
-    """The table of joints; `control` says what the command is, `source` where the numbers are from."""
+    """The table of joints; `control` states the meaning of the command, `source` the origin of the numbers."""
     written = io.StringIO()
     table = csv.writer(written, lineterminator="\n")
     table.writerow(HEADER)

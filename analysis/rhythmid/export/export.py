@@ -1,4 +1,4 @@
-"""Joints in the words of a target: one of MuJoCo, URDF, SDF, Isaac Lab, MATLAB, CSV and Nav2."""
+"""Joints in the format of a target: MuJoCo, URDF, SDF, Isaac Lab, MATLAB, CSV or Nav2."""
 
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
@@ -25,7 +25,7 @@ WRITERS: Mapping[Target, Callable[[Sequence[Joint], str], str]] = MappingProxyTy
 def exported(joints: Sequence[Joint], target: str, source: str = "a model") -> str:
     """Text of the target's file for at least one joint; `source` names the model in its first comment.
 
-    Raises InputError for an unknown target, two joints of one name, and joints that the target cannot hold together.
+    Raises InputError for an unknown target, two joints with one name, and joints that the target cannot combine.
     """
     known = next((one for one in get_args(Target) if one == target), None)
     if known is None:

@@ -1,4 +1,4 @@
-"""A model's elements in a simulator's words: what has such a word becomes a number of the joint, the rest a remark."""
+"""A model's elements as quantities of a simulator: what a simulator can express becomes a number of the joint, the rest a remark."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -9,20 +9,20 @@ from rhythmid.export.joint import Control, Joint
 from rhythmid.model import Model, Term
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
 
-NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")  # what all targets take as a name
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")  # a name that all targets accept
 Values = Mapping[str, float]
 
 
 @dataclass
 class _Reading:
-    """What is known of a joint while the model's terms are read in the order of the signal path."""
+    """The joint so far, while the model's terms are read in the order of the signal path."""
 
     mass: float
     rotational: bool
     numbers: dict[str, float] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     control: Control = "force"
-    back_emf: float = 0.0  # damping that a motor's back-EMF makes, as later gains scale it
+    back_emf: float = 0.0  # damping by a motor's back-EMF, scaled by later gains
     springs: int = 0
     soft_friction: float = 0.0  # the part of the dry friction that is a constraint
 
@@ -42,7 +42,7 @@ class _Reading:
 def joint_of(model: Model, name: str) -> Joint:
     """The model's one joint, called `name`.
 
-    Raises InputError where the units are not SI, the name is none that all targets take, or two controllers close the loop.
+    Raises InputError if the units are not SI, the name is not valid in all targets, or two controllers close the loop.
     """
     if NAME.fullmatch(name) is None:
         raise InputError(
@@ -71,7 +71,7 @@ def joint_of(model: Model, name: str) -> Joint:
 
 
 def _si(units: Units) -> bool:
-    """Whether units are SI, whatever name the inertia's goes by."""
+    """Whether units are SI, with any name of the inertia's unit."""
     known = {(one.force, one.position): one for one in (TRANSLATIONAL, ROTATIONAL)}
     one = known.get((units.force, units.position))
     return one is not None and units.mass in (one.mass, mass_unit(one.force, one.position))

@@ -1,6 +1,6 @@
 """Isaac Lab: actuator configurations with PD gains, friction, armature and a delay in physics steps.
 
-Friction and viscous friction are efforts from Isaac Sim 5.0 on; before, friction was a ratio without unit.
+Friction and viscous friction are efforts from Isaac Sim 5.0 on; in older versions friction is a ratio without unit.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""A joint in a simulator's words: inertia, damping, friction, stiffness, and an actuator with gain, lag and delay."""
+"""A joint in the quantities of a simulator: inertia, damping, friction, stiffness, and an actuator with gain, lag and delay."""
 
 import math
 from collections.abc import Collection
@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
-DIGITS = 12  # of a number in a target's file: more than any parameter is known to
+DIGITS = 12  # significant digits of a number in a target's file: more than any parameter is determined to
 Control = Literal["force", "position", "velocity"]
 
 
@@ -17,7 +17,7 @@ def _quantity(unit: str, meaning: str, absent: float = 0.0) -> Any:
 
 
 def number(value: float) -> str:
-    """A number as text, to DIGITS digits: products of parameters end in no noise."""
+    """A number as text with DIGITS digits, so that products of parameters show no rounding errors."""
     return repr(float(f"{value:.{DIGITS}g}"))
 
 
@@ -41,7 +41,7 @@ class Joint:
 
     The actuator's force is `gain` times the delayed and lagged command (`control` "force"), or times
     `position_gain` (r - x) - `velocity_gain` v ("position"), or times `velocity_gain` (r - v) ("velocity"), with the
-    delayed and lagged command as r. `remarks` say which effects of the model these words hold only nearly, or not at all.
+    delayed and lagged command as r. `remarks` name the effects of the model that these quantities express only approximately, or not at all.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Joint:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """All numbers that make a difference, in the order of the fields."""
+        """All numbers that differ from their neutral values, in the order of the fields."""
         return tuple(
             Quantity(one.name, value, self.unit(one.name), one.metadata["meaning"])
             for one in fields(self)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from rhythmid.errors import InputError
 from rhythmid.export.joint import Joint
 
-STANDARD_GRAVITY = 9.81  # [m/s^2] of a world whose gravity no joint says; the default of MuJoCo
-MASS_ON_AXIS = 1.0  # [kg] of a revolute link without weight: on its axis any mass does
-PRISMATIC_INERTIA = 1.0  # [kg*m^2] of a link that does not turn: any does
+STANDARD_GRAVITY = 9.81  # [m/s^2] if no joint determines the gravity; the default of MuJoCo
+MASS_ON_AXIS = 1.0  # [kg] of a revolute link without weight: any mass on its axis is valid
+PRISMATIC_INERTIA = 1.0  # [kg*m^2] of a link that does not turn: any value is valid
 Vector = tuple[float, float, float]
 
 
@@ -28,7 +28,7 @@ class Link:
 
 
 def world_gravity(joints: Sequence[Joint]) -> float:
-    """Gravity [m/s^2] that gives all joints their weight. Raises InputError where they ask for different ones."""
+    """Gravity [m/s^2] that gives all joints their weight. Raises InputError if they need different ones."""
     asked = {abs(joint.gravity) for joint in joints if joint.gravity}
     asked |= {STANDARD_GRAVITY for joint in joints if joint.weight_moment}
     if len(asked) > 1:

@@ -1,4 +1,4 @@
-"""MATLAB: a script that makes a struct array `joint` with all numbers, and of each joint's linear part a state space with delays."""
+"""MATLAB: a script that creates a struct array `joint` with all numbers, and a state space with delays of each joint's linear part."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class LinearPart:
     """dz/dt = A z + B u(t - input_delay), position(t) = equilibrium + z_1(t - output_delay).
 
     `states` names the n states z: position from the equilibrium and velocity, then lagged command and actuator force where there are
-    lags. A has the shape (n, n), B (n, 1). A link's weight is linearised where it hangs at rest.
+    lags. A has the shape (n, n), B (n, 1). A link's weight is linearised about its rest position.
     """
 
     states: tuple[str, ...]

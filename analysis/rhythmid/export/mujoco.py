@@ -1,7 +1,7 @@
-"""MuJoCo: an MJCF model with one body a joint, that loads as it is.
+"""MuJoCo: an MJCF model with one body per joint, which can be loaded directly.
 
 Delays need MuJoCo 3.5, nonlinear springs and dampers 4.0; they are written only where the joint has them.
-`frictionloss` is a soft constraint: friction that creeps where another identified law sticks.
+`frictionloss` is a soft constraint: it creeps where an identified law sticks.
 """
 
 import math
@@ -13,7 +13,7 @@ from rhythmid.export.joint import Joint, number
 from rhythmid.export.link import link_of, world_gravity
 from rhythmid.export.xml_text import add, comment, document, vector
 
-TIMESTEP = 0.001  # [s]; the rate at which experiments are run unless they say otherwise
+TIMESTEP = 0.001  # [s]; the default sample period of experiments
 EXPRESSED = frozenset(
     (
         "inertia", "gravity", "weight_moment", "hanging_position", "damping", "quadratic_damping", "friction", "stiffness",
@@ -86,12 +86,12 @@ def friction(joint: Joint, weight: float, step: float = TIMESTEP) -> dict[str, s
 
 
 def polynomial(linear: float, *higher: float) -> str:
-    """The linear coefficient alone, where the others are zero: what older versions read."""
+    """Only the linear coefficient if the others are zero, because older versions read only one."""
     return vector((linear, *higher)) if any(higher) else number(linear)
 
 
 def expressed(joint: Joint) -> frozenset[str]:
-    """What MJCF can say of this joint: an actuator has one low-pass and one delay, both before its control law."""
+    """The part of this joint that MJCF can express: an actuator has one low-pass filter and one delay, both before its control law."""
     inside = {"actuator_lag", "actuator_delay"} if joint.control != "force" else set()
     lags = {"actuator_lag"} if joint.command_lag else set()
     constant = {"constant_force"} if joint.effort_limit < math.inf else set()

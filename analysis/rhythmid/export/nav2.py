@@ -1,7 +1,7 @@
 """Nav2: the delays of a base's axis as the MPPI controller's `model_delay_vx` or `model_delay_wz`.
 
-The controller shifts its predicted speeds by a whole number of `model_dt`: a pure delay, and no lag. Up to frequencies well below
-1 / (2 pi tau) a lag tau is a delay of tau, so it is added.
+The controller shifts its predicted speeds by a whole number of `model_dt`: a pure delay without a lag. At frequencies well below
+1 / (2 pi tau) a lag tau acts as a delay of tau, so it is added.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ EXPRESSED = frozenset(("command_delay", "command_lag", "actuator_delay", "actuat
 
 
 def text(joints: Sequence[Joint], source: str) -> str:
-    """Parameters of the controller server. Raises InputError where two joints speak of the same axis."""
+    """Parameters of the controller server. Raises InputError if two joints refer to the same axis."""
     axes = ["wz" if joint.rotational else "vx" for joint in joints]
     if len(set(axes)) < len(axes):
         raise InputError("--to nav2: takes at most one prismatic (vx) and one revolute (wz) axis of a base")

@@ -1,4 +1,4 @@
-"""URDF: links, and joints with `dynamics` (damping, friction) and an effort limit; it has no other words for an actuator."""
+"""URDF: links, and joints with `dynamics` (damping, friction) and an effort limit; it cannot describe an actuator further."""
 
 import math
 import xml.etree.ElementTree as tree
@@ -11,7 +11,7 @@ from rhythmid.export.xml_text import add, comment, document, vector
 EXPRESSED = frozenset(
     ("inertia", "gravity", "weight_moment", "hanging_position", "damping", "friction", "effort_limit")
 )
-NO_LIMIT = 1e6  # of travel, effort and speed, where none is known: the format has no word for that
+NO_LIMIT = 1e6  # limit of travel, effort and speed if none is known: the format requires one
 
 
 def text(joints: Sequence[Joint], source: str) -> str:

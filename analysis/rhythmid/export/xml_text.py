@@ -1,4 +1,4 @@
-"""XML as text: elements with attributes, comments that are legal whatever they quote, two spaces a level."""
+"""XML as text: elements with attributes, comments that are valid whatever they quote, two spaces per level."""
 
 import xml.etree.ElementTree as tree
 from collections.abc import Iterable

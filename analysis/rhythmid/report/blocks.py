@@ -1,4 +1,4 @@
-"""What a section of a page is made of, and its HTML. Blocks hold plain text: whatever a recording is called, it stays text."""
+"""Parts of a section of a page, and their HTML. Blocks hold plain text, so that no name from a recording can become markup."""
 
 import re
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ class Bullets:
 
 @dataclass(frozen=True)
 class Tile:
-    """One figure that sums things up: what it is, its value, a remark."""
+    """One summary figure: its name, its value, a remark."""
 
     label: str
     value: str
@@ -48,7 +48,7 @@ class Table:
     """Rows of text under `columns`. `marked` are rows that stand out, `formulas` columns whose texts hold symbols
     with indices. The first column names the row, and leads to the address in `links` where there is one.
 
-    On a narrow screen each row becomes a card of its own.
+    On a narrow screen each row becomes a card.
     """
 
     caption: str
@@ -64,7 +64,7 @@ class Drawing:
     """An SVG drawing made by this package, with what to see in it.
 
     `legend` are (style, label) pairs; a style that begins with "square " or "circle " is shown as a mark, others as a line.
-    The page's script draws the `chart`, where there is one, in place of the drawing.
+    If there is a `chart`, the page's script draws it in place of the drawing.
     """
 
     title: str
@@ -77,7 +77,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Code:
-    """Text to be copied as it is."""
+    """Text to be copied unchanged."""
 
     label: str
     text: str
@@ -85,7 +85,7 @@ class Code:
 
 @dataclass(frozen=True)
 class Columns:
-    """Blocks side by side where there is room."""
+    """Blocks side by side if there is room."""
 
     blocks: tuple["Block", ...]
 
@@ -159,12 +159,12 @@ def markup(block: Block, most: int = FEWEST_POINTS) -> str:
 
 
 def words(text: str) -> str:
-    """Text made safe, with the delays' indices set as such."""
+    """Escaped text, with the indices of delays as subscripts."""
     return re.sub(r"([τδ])_([uyf])\b", r"\1<sub>\2</sub>", escape(text))
 
 
 def formula(text: str) -> str:
-    """An equation with its indices (_c, _{k−1}) and exponents (^{…}) set as such."""
+    """An equation with its indices (_c, _{k−1}) as subscripts and exponents (^{…}) as superscripts."""
     safe = re.sub(r"_\{([^{}]*)\}|_(\w+±?)", lambda m: f"<sub>{m[1] or m[2]}</sub>", escape(text))
     return re.sub(r"\^\{([^{}]*)\}", r"<sup>\1</sup>", safe)
 
@@ -180,7 +180,7 @@ def _tile(tile: Tile) -> str:
 
 
 def _table(table: Table) -> str:
-    # the roles keep it a table for screen readers where the style sheet lays rows out as cards
+    # the roles keep it a table for screen readers if the style sheet shows rows as cards
     head = "".join(f'<th role="columnheader" scope="col">{escape(name)}</th>' for name in table.columns)
     rows = []
     for index, row in enumerate(table.rows):

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from rhythmid.report.quantity import number
 
 Array = NDArray[np.float64]
-WIDTH, HEIGHT = 400.0, 250.0  # small enough that text stays readable when a phone shrinks the drawing
+WIDTH, HEIGHT = 400.0, 250.0  # small enough for readable text when a phone shrinks the drawing
 LEFT, RIGHT, TOP, BOTTOM = 54.0, 12.0, 26.0, 42.0
-FEWEST_TICKS, MOST_TICKS = 3, 9  # an axis with fewer is hard to read, one with more is crowded
-COLUMN = 2.0  # pixels within which points of a curve are not told apart
+FEWEST_TICKS, MOST_TICKS = 3, 9  # ticks: fewer are hard to read, more are crowded
+COLUMN = 2.0  # pixels within which points of a curve are not distinguishable
 MOST_OF_PATH = 400  # points of a path that are drawn
 
 
@@ -35,8 +35,8 @@ class Curve:
 class Chart:
     """Curves over one pair of axes.
 
-    `x_range` is what the data span unless given. `shaded` are stretches (from, to) of x, `levels` horizontal lines (y, label),
-    `uprights` vertical ones (x, label), `alt` what the chart shows in words for who cannot see it. Charts with the same `link`
+    `x_range` is the range of the data unless given. `shaded` are stretches (from, to) of x, `levels` horizontal lines (y, label),
+    `uprights` vertical ones (x, label), `alt` the content of the chart in words for readers who cannot see it. Charts with the same `link`
     show the same range of x. A `path` is a curve whose x need not grow, such as an orbit.
     """
 
@@ -108,7 +108,7 @@ def linear_ticks(low: float, high: float, most: int = 6) -> list[float]:
 
 
 def extent(values: Sequence[Array], log: bool = False, from_zero: bool = False) -> tuple[float, float]:
-    """Range of an axis that shows all finite values, with some air."""
+    """Range of an axis that shows all finite values, with a margin."""
     joined = np.concatenate([np.ravel(v) for v in values]) if values else np.empty(0)
     joined = joined[np.isfinite(joined)]
     if log:
@@ -249,7 +249,7 @@ def _curve(curve: Curve, x: Axis, y: Axis) -> str:
         if curve.low is not None and curve.high is not None:
             low, high = y(curve.low[piece]), y(curve.high[piece])
             parts.append(f'<path class="band {curve.style}" d="{_ring(across, low, high)}"/>')
-        if len(across) > 6 * columns:  # more samples than pixels: the outline of what they cover
+        if len(across) > 6 * columns:  # more samples than pixels: their envelope
             parts.append(f'<path class="cover {curve.style}" d="{_ring(*_envelope(across, up, columns))}"/>')
         else:
             parts.append(f'<path class="line {curve.style}{dash}" d="M{_points(*_visible(across, up))}"/>')
@@ -257,7 +257,7 @@ def _curve(curve: Curve, x: Axis, y: Axis) -> str:
 
 
 def _visible(x: Array, y: Array) -> tuple[Array, Array]:
-    """The points of a curve that can be told apart: of those in one column of pixels the lowest and the highest."""
+    """The distinguishable points of a curve: the lowest and the highest in each column of pixels."""
     if len(x) < 3:
         return x, y
     column = np.floor(x / COLUMN)
@@ -269,7 +269,7 @@ def _visible(x: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _path(curve: Curve, x: Axis, y: Axis) -> str:
-    """An orbit, thinned to what can be told apart on paper."""
+    """An orbit, thinned to points that are distinguishable on paper."""
     dash = " dashed" if curve.dashed else ""
     kept = np.isfinite(curve.x) & np.isfinite(curve.y)
     stride = max(1, int(kept.sum()) // MOST_OF_PATH)

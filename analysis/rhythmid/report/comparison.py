@@ -1,4 +1,4 @@
-"""A simulation beside a recording: a section of a diagnosis' report, or a page of its own."""
+"""Comparison of a simulation with a recording: a section of a diagnosis' report, or a separate page."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -70,7 +70,7 @@ def _seconds(value: float) -> str:
 
 
 def comparison_section(result: Mapping[str, Any], run: Run, unit: str, path: bool = False) -> Section:
-    """What a comparison found; `path` says to draw the signal path as well."""
+    """Results of a comparison; with `path` the signal path is drawn as well."""
     blocks: list[Block] = [] if path else [Paragraph(result["summary"], "lead")]
     if path and result["slot"] is not None:
         names = [one for one in result["explanations"] if one["slot"] is not None]

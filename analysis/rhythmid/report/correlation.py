@@ -1,4 +1,4 @@
-"""How the errors of parameters go together, as a coloured matrix."""
+"""Correlation of the errors of parameters, as a coloured matrix."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from rhythmid.report.row_chart import row_label, row_label_height, row_label_wid
 from rhythmid.report.state_map import SHADES, shade_class
 
 Array = NDArray[np.float64]
-HIGH_ROW = 34.0  # most height of a row; the least is that of its name
+HIGH_ROW = 34.0  # largest height of a row; the smallest is that of its name
 WIDE_ENOUGH = 34.0  # width of a cell from which a number fits into it
-STRONG = 0.9  # correlation from which two parameters are hardly told apart
+STRONG = 0.9  # correlation above which two parameters are hardly separable
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def _strongest(found: Correlation) -> str:
 
 
 def _told(value: float) -> str:
-    """Two decimals, and never 1 of what is not exact."""
+    """Two decimals; a value that is not exactly 1 is never printed as 1."""
     if not np.isfinite(value):
         return NONE
     text = f"{abs(value):.2f}"

@@ -169,7 +169,7 @@ def _what(found: Findings) -> Section:
         blocks.append(Equation(effect["equation"]))
         known = found.words.get(effect["element"])
         said = f"It explains {percent(effect['share'])} of the mismatch"
-        if result["verdict"] == "missing_physics":  # else the verdict does not stand by the name
+        if result["verdict"] == "missing_physics":  # otherwise the verdict does not state the name
             said += f"; the probability of the name is {probability(effect['probability'])}"
         blocks.append(Paragraph(f"{said}."))
         blocks.append(parameters_table(effect["parameters"], known.parameters if known else None))
@@ -275,7 +275,7 @@ def _residuals(found: Findings) -> Section:
 
 
 def _harmonics(found: Findings) -> list[Section]:
-    """Harmonics and transfer functions, where the records or the models were asked for them."""
+    """Harmonics and transfer functions, if they were computed."""
     blocks: list[Block] = []
     forced = []
     if found.slow_noise is not None:
@@ -318,6 +318,6 @@ def _calibration(found: Findings) -> Section:
 
 
 def _assumptions(found: Findings) -> list[Section]:
-    """What the answer takes for granted; nothing where it says nothing of that."""
+    """Assumptions of the answer; empty if it has none."""
     lines = tuple(sentence(plain(line)) for line in found.result["assumptions"])
     return [Section("What was assumed", (Bullets(lines),))] if lines else []

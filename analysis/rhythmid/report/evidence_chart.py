@@ -1,4 +1,4 @@
-"""Hypotheses by their evidence: how much worse than the best each predicts unseen data, with its standard error."""
+"""Hypotheses by their evidence: how much worse than the best each predicts held-out data, with its standard error."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ TICKS = (0.0, 1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
 
 @dataclass(frozen=True)
 class Evidence:
-    """A hypothesis: by how much it predicts `worse` than the best, with the standard `error` of that; `text` is its weight,
+    """A hypothesis: `worse` is the difference of its prediction from the best, `error` the standard error of the difference; `text` is its weight,
     `style` a class of the style sheet, `hint` what is shown under the pointer."""
 
     label: str
@@ -89,7 +89,7 @@ def _compressed(value: float) -> float:
 
 
 def _ticks(most: float, width: float) -> list[float]:
-    """Ticks up to the end of the axis, no nearer together than their numbers allow."""
+    """Ticks up to the end of the axis, with room for their numbers."""
     inside = [tick for tick in TICKS if _compressed(tick) <= most]
     stride = max(1, math.ceil(len(inside) * 44.0 / width))
     return inside[::stride]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 
-DOTS = 150  # of an estimate that are drawn
+DOTS = 150  # points of an estimate that are drawn
 STYLES: dict[str, dict[str, Any]] = {
     "theory": {"color": "tab:red", "linestyle": "-"},
     "estimate": {"color": "black", "linestyle": "none", "marker": ".", "markersize": 3},
@@ -35,7 +35,7 @@ Panels = Mapping[int, Sequence[Curve]]
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a PNG whole or not at all. Raises InputError when the place is not writable."""
+    """Write a PNG completely or not at all. Raises InputError if the place is not writable."""
     partial = path.with_name(f".{path.name}.partial")
     try:
         figure.savefig(partial, format="png", dpi=130)

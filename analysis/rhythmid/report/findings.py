@@ -1,4 +1,4 @@
-"""What a diagnosis found, as plain data for its report."""
+"""Results of a diagnosis, as plain data for its report."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -37,9 +37,9 @@ class ElementScore:
 
 @dataclass(frozen=True, eq=False)
 class FreeFunction:
-    """The missing force (or sensor error) as an unknown smooth function of one quantity, before and after the repair.
+    """The missing force (or sensor error) as an unknown smooth function of one quantity, before and after the effects are added.
 
-    `explained` is the share of the mismatch that it explains in blocks left out of its fit; `grid`, `force` (k,) draw it.
+    `explained` is the share of the mismatch that it explains in held-out blocks; `grid`, `force` (k,) draw it.
     """
 
     quantity: str
@@ -68,7 +68,7 @@ class TransferChange:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """All that the page shows, as plain data. What has a default belongs to one way of scoring only, and is left out where it is
+    """The content of the page, as plain data. Fields with a default belong to one scoring mode only, and are left out if
     absent.
 
     Attributes
@@ -76,20 +76,20 @@ class Findings:
     result : the diagnosis as its JSON has it.
     source : the nominal model's name and the records' names in words.
     slots : elements of the nominal model by slot; `forced` if a forcing was recorded.
-    compared : what of the records is compared with what the models say: motion or effort.
-    runs : records beside what the models say of them, those held out last.
-    chosen : names of the chosen hypothesis, nothing where that is the nominal model.
-    output_unit, force_unit : of the motion, and of what moves it.
-    noise : standard deviation of the measurement noise in the compared averages, by what repeats; None where nothing does.
-    slow_noise : of slow averages, per sample: noise as above, or what the final model leaves.
-    scores : best score test of every element, best first; `threshold` above which chance is no explanation.
+    compared : quantity in which records and models are compared: motion or effort.
+    runs : records with the predictions of the models, held-out records last.
+    chosen : names of the chosen hypothesis; empty for the nominal model.
+    output_unit, force_unit : units of the motion, and of the force.
+    noise : standard deviation of the measurement noise in the compared averages, from repetitions; None if nothing repeats.
+    slow_noise : of slow averages, per sample: noise as above, or the residual of the final model.
+    scores : best score test of every element, best first; scores above `threshold` are significant.
     functions : free functions, the most explaining first.
     transfer : change of the transfer functions, or the reason why there is none; None where they were not looked at.
     nominal, refitted, refitted_delays : the nominal model's parameters as given and refitted, and its delays.
     at_bound : parameters of the final model that ended at a bound; `unconverged` models whose refit did not settle.
-    words : what the catalogue says of the elements that are mentioned, by name.
-    hints : (element, other element, what tells them apart).
-    correlation : of the final model's parameters, where they were fitted together.
+    words : descriptions of the mentioned elements in the catalogue, by name.
+    hints : (element, other element, experiment that separates them).
+    correlation : of the final model's parameters, if they were fitted together.
     """
 
     result: Mapping[str, Any]
@@ -126,11 +126,11 @@ class Findings:
 
     @property
     def changed(self) -> str:
-        """What the final model is beside the refitted nominal one, in words."""
+        """Difference of the final model from the refitted nominal one, in words."""
         return self.runs[0].labels[1] if self.runs else "with the added effect"
 
     def unit_of(self, quantity: str) -> str:
-        """Unit of a quantity that a mismatch may go with."""
+        """Unit of a quantity on which a mismatch may depend."""
         rates = {"velocity": "s", "acceleration": "s^2"}
         if quantity in rates:
             return f"{self.output_unit}/{rates[quantity]}"

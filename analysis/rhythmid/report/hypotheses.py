@@ -1,4 +1,4 @@
-"""What else might be missing: all hypotheses by their evidence, and what speaks against those that are not believed."""
+"""All hypotheses by their evidence, and the reasons for the rejected ones."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from rhythmid.report.quantity import NONE, number, percent, plain, plus_minus, p
 from rhythmid.report.row_chart import Bar, draw_bars
 
 HYPOTHESES_SHOWN, REJECTIONS_SHOWN, SCORES_SHOWN = 12, 12, 12
-LEAST_ODDS = math.log(40.0)  # difference of log density from which a simpler model is given up
+LEAST_ODDS = math.log(40.0)  # difference of log density above which a simpler model is rejected
 KINDS = {
     "nominal": "nothing is missing",
     "effects": "effects are missing",
@@ -107,7 +107,7 @@ def _evidence(
 
 
 def _weight(row: Mapping[str, Any], weighed: int) -> str:
-    """Weight of a hypothesis; a dash where it does not share in the evidence."""
+    """Weight of a hypothesis; a dash if it is not part of the evidence."""
     return NONE if len(row["elements"]) > weighed else f"{row['probability']:.2f}"
 
 
@@ -128,7 +128,7 @@ def interchangeable(elements: Sequence[str], chosen: Sequence[str], groups: Sequ
 
 
 def grouped(excluded: Sequence[tuple[str, str]]) -> list[str]:
-    """What was not tried, as (name, reason), in one line for each reason, with all its names."""
+    """Candidates that were not tried, given as (name, reason): one line for each reason, with all its names."""
     names: dict[str, list[str]] = {}
     for name, reason in excluded:
         names.setdefault(reason, []).append(name)
@@ -200,7 +200,7 @@ def _scores(found: Findings) -> list[Block]:
 
 
 def rejections_section(found: Findings) -> Section:
-    """What speaks against hypotheses, one row for each rule that rejects one."""
+    """Reasons against hypotheses, one row for each rule that rejects one."""
     rejections: Sequence[Mapping[str, Any]] = found.result["rejections"]
     title = "What is not believed, and why"
     if not rejections:

@@ -22,7 +22,7 @@ from rhythmid.report.sections import (
 )
 from rhythmid.report.transfer_figures import TransferFunction, harmonic_name, scaled_ratio, transfer_grid
 
-SHOWN = 1  # |m| up to which transfer functions are shown at once; others are folded away
+SHOWN = 1  # |m| up to which transfer functions are shown; others are shown on demand
 OBSERVABLES = {
     "A": "the phase of the limit cycle",
     "B": "the slope of G₀",
@@ -53,7 +53,7 @@ def identification_page(
     """The report of `identify`.
 
     `result` is what `identify --json` writes; `source` names model and records; `models` are YAML texts by title; `unit` that of
-    the transfer functions. `transfer` replaces the functions in `result` where more is known of them, such as the fitted
+    the transfer functions. `transfer` replaces the functions in `result` if they have more information, such as the fitted
     model's. `runs` are the records beside the identified model's free run, `position` the unit of the motion.
     """
     functions = list(transfer) if transfer is not None else functions_of(result)
@@ -78,7 +78,7 @@ def identification_page(
 
 
 def _parameters(result: Mapping[str, Any]) -> Section:
-    """The estimates, and how their errors go together where they were fitted together."""
+    """The estimates, and the correlation of their errors if they were fitted together."""
     blocks: list[Block] = [parameters_table(result["parameters"])]
     covariance = result.get("covariance")
     if covariance is not None and len(covariance["names"]) > 1:
@@ -88,7 +88,7 @@ def _parameters(result: Mapping[str, Any]) -> Section:
 
 
 def _residuals(runs: Sequence[Run], position: str) -> list[Section]:
-    """What the identified model leaves of the records; nothing where it was not simulated."""
+    """Residual of the identified model; empty if the model was not simulated."""
     if not runs:
         return []
     compared = Compared("motion", position)
@@ -152,7 +152,7 @@ def _tiles(result: Mapping[str, Any]) -> Tiles:
 
 
 def _delays(result: Mapping[str, Any]) -> Section:
-    """The delays, and what is known where they cannot be told apart."""
+    """The delays, and what is known if they are not separable."""
     delays = result["delays"]
     section = delays_section(delays)
     more: list[Block] = []
@@ -201,14 +201,14 @@ def transfer_section(functions: Sequence[TransferFunction], unit: str = "m/N", *
 
 
 def _missing(result: Mapping[str, Any]) -> tuple[Block, ...]:
-    """What transfer functions, or the paper's method, lack here."""
+    """Conditions of transfer functions, or of the paper's method, that fail here."""
     about, methods = result.get("transfer_functions") or {}, result.get("methods") or {}
     lacks = dict.fromkeys((about.get("missing"), methods.get("paper_missing")))
     return tuple(Paragraph(sentence(text), "note") for text in lacks if text)
 
 
 def _errors(result: Mapping[str, Any], unit: str) -> tuple[Block, ...]:
-    """How the transfer functions were found, and how large each kind of error is in each of them."""
+    """Method of the transfer functions, and the size of each kind of error in each of them."""
     about = result.get("transfer_functions") or {}
     method = FOUND_BY.get(about.get("method") or "")
     functions = [
@@ -327,7 +327,7 @@ def comparison_section(
 
 
 def _pair(found: Mapping[str, float]) -> str:
-    """Two delays in milliseconds, or their sum where only that is known."""
+    """Two delays in milliseconds, or their sum if only the sum is known."""
     if "input" in found and "measurement" in found:
         return f"{1e3 * found['input']:.1f} / {1e3 * found['measurement']:.1f} ms".replace("-", "−")
     return _milliseconds(found.get("sum"))

@@ -1,5 +1,5 @@
 """The report of an identified machine of several joints: the robot, a table of all joints, and for each joint its estimates, its effort as
-measured and as predicted, what is left of it over frequency, and how the estimates' errors go together."""
+measured and as predicted, its residual over frequency, and the correlation of the estimates."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -200,7 +200,7 @@ def _against(joint: str, one: IdentifiedEffort, unit: str) -> Drawing:
 
 
 def _spectrum(joint: str, one: IdentifiedEffort, unit: str) -> Drawing | None:
-    """Amplitude density of the effort and of what is left of it, over the longest stretch without a long gap; P. D. Welch, IEEE Trans. Audio
+    """Amplitude density of the effort and of its residual, over the longest stretch without a long gap; P. D. Welch, IEEE Trans. Audio
     Electroacoust. 15 (1967) 70. The samples at rest that a fit leaves out are bridged by straight lines."""
     steps = np.diff(one.time)
     period = float(np.median(steps))

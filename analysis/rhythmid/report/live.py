@@ -1,4 +1,4 @@
-"""A chart's data as the page's script reads them: compact, and no more of them than a page should weigh."""
+"""A chart's data for the page's script: compact, and limited to a maximum size of the page."""
 
 import base64
 import json
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from rhythmid.report.chart import Chart, Curve, x_extent, y_extent
 
 Array = NDArray[np.float64]
-BUDGET = 700_000  # bytes that the curves of all charts of a page take at most, or so
+BUDGET = 700_000  # approximate maximum of bytes for the curves of all charts of a page
 VALUE = 2.7  # bytes of one value: two, in base 64
 FEWEST_POINTS = 400  # points of a curve that are always kept: about one for each pixel of a phone
-MISSING = 65535  # stands for a value that is not known
+MISSING = 65535  # code of an unknown value
 LEVELS = 65534.0  # steps in which a curve's range is stored, far finer than a screen shows
-UNEVEN = 1e-6  # of a step, by which samples may be off an even grid
+UNEVEN = 1e-6  # share of a step by which samples may deviate from an even grid
 
 
 def most_points(charts: Sequence[Chart], budget: float = BUDGET) -> int:
@@ -61,7 +61,7 @@ def chart_data(chart: Chart, most: int) -> str:
         **curves,
     }
     text = json.dumps(told, separators=(",", ":"), allow_nan=False)
-    # what a name from a recording holds can neither end the element nor begin a comment
+    # a name from a recording can neither end the element nor begin a comment
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
@@ -110,7 +110,7 @@ def _stretch(count: int, most: int) -> int:
 
 
 def _extremes(y: Array, most: int) -> Array:
-    """The smallest and the largest value of every stretch, in the order in which they came."""
+    """The smallest and the largest value of every interval, in their order in time."""
     if len(y) <= most:
         return y
     kept = []
@@ -124,7 +124,7 @@ def _extremes(y: Array, most: int) -> Array:
 
 
 def _even(x: Array) -> tuple[float, float] | None:
-    """First point and step of points that are evenly spaced; None where they are not."""
+    """First point and step of evenly spaced points; None for others."""
     if len(x) < 2:
         return None
     step = float(x[-1] - x[0]) / (len(x) - 1)
@@ -133,7 +133,7 @@ def _even(x: Array) -> tuple[float, float] | None:
 
 
 def _grid(x: Array, most: int) -> dict[str, Any]:
-    """Points that grow, thinned as `_extremes` does: first and step where they are even, single precision where not."""
+    """Increasing points, thinned as by `_extremes`: first point and step if they are even, else single precision."""
     even, places = _even(x), np.arange(len(x))
     if len(x) > most:
         width = _stretch(len(x), most)

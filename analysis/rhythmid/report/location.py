@@ -1,4 +1,4 @@
-"""Where model and machine differ, and what stays unexplained: sections of a diagnosis' report."""
+"""Where model and machine differ, and what remains unexplained: sections of a diagnosis' report."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,8 +13,8 @@ from rhythmid.report.row_chart import Bar, draw_bars
 from rhythmid.report.run import worst_place
 from rhythmid.report.signal_path import SlotContent, draw_signal_path
 
-SHARE = 0.2  # of the mismatch from which a quantity is said to go with it
-TELLING = 0.05  # share of the mismatch from which a free function is worth a look
+SHARE = 0.2  # share of the mismatch above which it is said to depend on a quantity
+TELLING = 0.05  # share of the mismatch above which a free function is shown
 
 
 def location_section(found: Findings) -> Section:
@@ -131,7 +131,7 @@ def _dependences(found: Findings) -> Drawing | None:
 
 
 def unknown_section(found: Findings) -> Section:
-    """What the named effects leave: its share of the mismatch, what it depends on, and its curve over that quantity."""
+    """The remainder of the named effects: its share of the mismatch, the quantity on which it depends, and its curve over that quantity."""
     left = found.result["remainder"]
     verdict = found.result["verdict"]
     if left["significant"]:

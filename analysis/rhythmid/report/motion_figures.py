@@ -1,4 +1,4 @@
-"""Figures of a record's motion beside what models make of it: over time, and in the plane of position and velocity."""
+"""Figures of a record's motion and of the models' motion: over time, and in the plane of position and velocity."""
 
 import math
 
@@ -14,24 +14,24 @@ from rhythmid.report.run import Compared, Run, density
 Array = NDArray[np.float64]
 CYCLES = 6.0  # of the strongest line, that a phase portrait shows
 SMOOTHED = 0.1  # of a cycle, over which a cubic is fitted for the velocity
-SWITCHING = "switching"  # what the places are called at which the model switches
+SWITCHING = "switching"  # label of the places at which the model switches
 FEWEST_IN_WINDOW = 7  # samples that such a cubic is fitted to at least
 
 
 def time_link(run: Run) -> str:
-    """What charts of this record over time have in common: they are zoomed together."""
+    """Key of the charts of this record over time, which are zoomed together."""
     return f"time of {run.name}{' (held out)' if run.heldout else ''}"
 
 
 def shaded(run: Run) -> tuple[tuple[float, float], ...]:
-    """Stretches of a record that were hidden from the fit, as (from, to) [s]."""
+    """Held-out stretches of a record, as (from, to) [s]."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], run.hidden.astype(np.int8), [0]])))
     last = len(run.time) - 1
     return tuple((float(run.time[a]), float(run.time[min(b, last)])) for a, b in zip(edges[::2], edges[1::2]))
 
 
 def over_time(run: Run, compared: Compared) -> Drawing:
-    """What was measured and what the models make of it."""
+    """Measured motion and that of the models."""
     factor, unit = scaled(float(np.ptp(run.measured)), compared.unit)
     curves = [
         Curve(run.time, factor * run.measured, "measured", "measured"),

@@ -1,6 +1,6 @@
 """A report as one self-contained HTML page: nothing fetched, readable on a phone, in print, light and dark, and without scripts.
 
-Its figures are drawings; a script of the page, which the page names by its hash, puts plots in their places that can be zoomed.
+Its figures are drawings. A script, which the page allows by its hash, replaces them by plots that can be zoomed.
 """
 
 import base64
@@ -27,7 +27,7 @@ HINT = (
     '<button type="button" class="drawings" aria-pressed="false" hidden>Drawings instead of plots</button></p>'
 )
 LIBRARY, LICENCE = "vendor/uplot/uPlot.iife.min.js", "vendor/uplot/LICENSE"
-SCRIPTS = ("live_plot.js", "live.js")  # of our own, in the order in which they run
+SCRIPTS = ("live_plot.js", "live.js")  # rhythmid's own scripts, in the order in which they run
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Page:
     """A report.
 
     `kicker` says what kind of report of what, `verdict` is the answer in a few words, `words` the same in about two
-    sentences, `tiles` its most important numbers. `tone` colours the verdict; it is never the only bearer of meaning.
+    sentences, `tiles` its most important numbers. `tone` colours the verdict; the meaning never depends on the colour alone.
     """
 
     title: str
@@ -102,12 +102,12 @@ def _file(name: str) -> str:
 
 
 def _scripts() -> list[str]:
-    """The library, with the licence that every copy of it has to bear, and our own."""
+    """The library with its licence, which every copy has to contain, and rhythmid's own scripts."""
     return [f"/*\n{_file(LICENCE)}*/\n{_file(LIBRARY)}", *map(_file, SCRIPTS)]
 
 
 def _policy(scripts: list[str]) -> str:
-    """What the page may do: run these scripts and no other, fetch nothing."""
+    """Content-Security-Policy of the page: it may run these scripts only, and fetch nothing."""
     hashes = [
         base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
         for script in scripts
@@ -117,7 +117,7 @@ def _policy(scripts: list[str]) -> str:
 
 
 def write_page(path: Path, page: Page) -> None:
-    """Write the page whole or not at all. Raises InputError when the place is not writable."""
+    """Write the page completely or not at all. Raises InputError if the place is not writable."""
     write_text(path, render(page))
 
 

@@ -1,4 +1,4 @@
-"""Numbers as people read them: value ± half-width of the 95 % interval, with its unit."""
+"""Numbers for readers: value ± half-width of the 95 % interval, with its unit."""
 
 import math
 import re
@@ -7,8 +7,8 @@ from rhythmid.statistics import NORMAL_95
 
 MINUS = "\u2212"
 NONE = "—"
-DECIMALS = 12  # printed at most: a double has no more near 1
-RARE = 1e-3  # probability below which only that is told
+DECIMALS = 12  # digits printed at most: a double has no more near 1
+RARE = 1e-3  # smaller probabilities are only stated to be below this
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 PREFIXED = {"m", "s", "N", "rad", "V", "A", "Hz", "N*m"}
 _SPELT = {
@@ -44,7 +44,7 @@ def pretty_name(name: str) -> str:
 
 
 def plain(text: str) -> str:
-    """A line of the command's output as the page says it: names without underscores, χ² and powers of ten spelled out."""
+    """A line of the command's output for the page: names without underscores, with χ² and powers of ten."""
     text = re.sub(r"\b[a-z][a-z0-9]*(?:_[a-z0-9]+)+\b", lambda found: in_words(found[0]), text)
     text = re.sub(r"(?<=[a-z0-9])\.(?=[a-z])", ": ", text)
     text = re.sub(r"(?<=[A-Za-z])\*(?=[A-Za-z])", "·", text)  # units: N·s/m
@@ -148,7 +148,7 @@ def percent(ratio: float | None, half: float | None = None) -> str:
 
 
 def probability(value: float | None) -> str:
-    """A probability in percent. Evidence never makes one 0 or 1, so the rest of very small and very large ones is bounded."""
+    """A probability in percent. Evidence never gives exactly 0 or 1, so very small and very large probabilities are stated as bounds."""
     if value is None or math.isnan(value):
         return NONE
     if value < RARE:

@@ -1,4 +1,4 @@
-"""How good the recordings are: a section of every report."""
+"""Quality of the recordings: a section of every report."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,9 +10,9 @@ from rhythmid.report.quantity import NONE, number, scaled, with_unit
 
 @dataclass(frozen=True)
 class RecordQuality:
-    """What a reader should know of one record before trusting what was found in it. None: not known.
+    """Properties of one record that a reader should know before trusting a result. None: not known.
 
-    `duration` [s], `rate` [Hz] and `jitter` (standard deviation of the time between samples [s]) are of the output.
+    `duration` [s], `rate` [Hz] and `jitter` (standard deviation of the time between samples [s]) refer to the output.
     """
 
     name: str
@@ -28,7 +28,7 @@ class RecordQuality:
 
 
 def quality_of(record: Record, role: str) -> RecordQuality:
-    """What the record itself knows of its quality; `role` says what it was used for."""
+    """Quality of a record; `role` states its use."""
     known = record.quality if "output" in record.quality.channels else None
     return RecordQuality(
         name=record.name,

@@ -1,4 +1,4 @@
-"""The report of a recording: what is in it, how good its timing is, and how its channels look."""
+"""The report of a recording: its content, the quality of its timing, and its channels over time."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,7 +16,7 @@ from rhythmid.report.sections import reproduce_section
 Array = NDArray[np.float64]
 LINK = "time"
 MEGABYTE = 1e6
-EVEN = 1e-3  # of a step, by which steps differ that are drawn as a flat line anyway
+EVEN = 1e-3  # share of a step; smaller differences between steps are drawn as a flat line
 USABLE: dict[bool, tuple[str, Tone]] = {
     True: ("Usable, with remarks", "found"),
     False: ("Usable, and nothing to remark", "good"),
@@ -33,7 +33,7 @@ def recording_page(
 ) -> Page:
     """The report of `check`, and of `run` with its own `verdict` and `further` sections, which come first.
 
-    `result` is what `check --json` writes, `record` what could be read of it, `remarks` what deserves mention, one line each.
+    `result` is the output of `check --json`, `record` the readable part of the recording, `remarks` the notes, one line each.
     """
     said, tone = verdict or (USABLE[bool(remarks)] if result["usable"] else ("Not usable", "open"))
     problems = " ".join(map(sentence, result["problems"]))

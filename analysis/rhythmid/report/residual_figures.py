@@ -1,4 +1,4 @@
-"""Figures of what a model leaves of a record: over time, over the cycle, over the states, over frequency."""
+"""Figures of a model's residual: over time, over the cycle, over the states, over frequency."""
 
 from collections.abc import Iterator, Sequence
 
@@ -29,8 +29,8 @@ MOST_SHOWN = 12  # records drawn in full; all are in the table
 
 
 def residual_folds(runs: Sequence[Run], compared: Compared, position: str) -> list[Fold | Paragraph]:
-    """The figures of every record, opened for the one that gains most among those held out; of very many records only the most
-    telling.
+    """The figures of every record, opened for the held-out record with the largest gain. Of very many records only the most
+    informative are shown.
 
     `position` is the unit of the motion.
     """
@@ -258,7 +258,7 @@ def _told(error: Error | None, unit: str) -> str:
 
 
 def cycle_harmonics(run: Run, unit: str, noise: float) -> Table | None:
-    """Harmonics of the forcing in a record, and what the models miss of them; None without forcing."""
+    """Harmonics of the forcing in a record, and the models' errors in them; None without forcing."""
     found = harmonics(run, noise)
     if not found:
         return None

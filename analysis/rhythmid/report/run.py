@@ -1,4 +1,4 @@
-"""One record beside what models make of it, and what the difference shows: in time, in the cycle, in frequency."""
+"""One record with the predictions of models, and their difference in time, in the cycle and in frequency."""
 
 import math
 from collections.abc import Sequence
@@ -23,14 +23,14 @@ FEWEST_SAMPLES = 16  # samples below which a record is not drawn
 
 @dataclass(frozen=True)
 class Compared:
-    """What of a record is compared with what a model says of it.
+    """The quantity in which a record is compared with a model.
 
     Parameters
     ----------
     quantity : "motion" or "effort"; errors are shares of it.
     unit : of the quantity.
-    made : what a model does to come to it: "simulated" or "predicted".
-    bandwidth : frequency [Hz] below which it is compared; None where nothing is filtered.
+    made : how a model obtains it: "simulated" or "predicted".
+    bandwidth : frequency [Hz] below which it is compared; None without a filter.
     """
 
     quantity: str
@@ -51,7 +51,7 @@ class Switch:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A record beside what models say of it: a free run's motion, or the effort that its motion needs.
+    """A record with the predictions of models: the motion of a free run, or the effort that its motion needs.
 
     Attributes
     ----------
@@ -60,12 +60,12 @@ class Run:
     before : float64[n] the same by the refitted nominal model; `after` by the augmented one, None where there is none.
     position, velocity : float64[n] motion of the mass, by the better model or as it was measured.
     phase : float64[n] phase of the forcing's cycle, 0 <= phase < 1, or None without forcing.
-    used : bool[n] samples that count: those the fit saw, or, where `heldout`, those it never saw.
-    hidden : bool[n] samples of a record that the fit was not shown although it saw the rest.
-    heldout : whether no fit has seen this record.
-    quiet : whether nothing but the forcing drove the machine.
-    size : what an error is a share of, where that is not the standard deviation of `measured` [its unit].
-    labels : what `before` and `after` are called in figures.
+    used : bool[n] samples that count: those used in the fit or, if `heldout`, the held-out ones.
+    hidden : bool[n] held-out samples of a record whose other samples were used in the fit.
+    heldout : whether the whole record is held out.
+    quiet : whether only the forcing drove the machine.
+    size : reference of relative errors, if this is not the standard deviation of `measured` [its unit].
+    labels : names of `before` and `after` in figures.
     switches : where the better model switches; None where `measured` is no position.
     """
 
@@ -86,7 +86,7 @@ class Run:
     switches: tuple[Switch, ...] | None = ()
 
     def residual(self, which: Which) -> Array:
-        """Measured minus what the model says, float64[n]."""
+        """Measured minus predicted, float64[n]."""
         said = self.after if which == "after" and self.after is not None else self.before
         return self.measured - said
 
@@ -166,8 +166,8 @@ def density(run: Run, signal: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Harmonic:
-    """Harmonic h of the forcing in a record's steady motion: amplitude measured, amplitude of what each model misses of
-    it, and the standard deviation of these [unit of the output]."""
+    """Harmonic h of the forcing in a record's steady motion: measured amplitude, amplitude of each model's error,
+    and the standard deviation of these [unit of the output]."""
 
     number: int
     measured: float
@@ -202,7 +202,7 @@ def harmonics(run: Run, noise: float, highest: int = 4) -> list[Harmonic]:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run departs most from the refitted nominal model.
+    """Where a run differs most from the refitted nominal model.
 
     `time` [s] is the middle of the worst cycle (of the strongest line, without forcing), `phase` of the forcing's cycle
     (None without), `position` and `velocity` the states with the largest mean residual, `frequency` [Hz] the strongest line of
@@ -219,7 +219,7 @@ class Place:
 
 
 def worst_place(runs: Sequence[Run]) -> Place | None:
-    """Where the refitted nominal model departs most from the records."""
+    """Where the refitted nominal model differs most from the records."""
     candidates = [run for run in runs if run.used.sum() >= FEWEST_SAMPLES]
     if not candidates:
         return None

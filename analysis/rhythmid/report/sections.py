@@ -35,7 +35,7 @@ def parameters_table(
     meanings: Mapping[str, str] | None = None,
     caption: str = "Parameters with 95 % intervals.",
 ) -> Table:
-    """Estimates by name, with what they mean where that is known."""
+    """Estimates by name, with their meaning if known."""
     if meanings:
         rows = tuple((pretty_name(name), told(one), meanings.get(name, "")) for name, one in found.items())
         return Table(caption, ("parameter", "value", "meaning"), rows, formulas=(2,))
@@ -47,7 +47,7 @@ def parameters_table(
 def compared_parameters(
     nominal: Estimates, refitted: Estimates, augmented: Estimates | None, at_bound: Sequence[str] = ()
 ) -> Table:
-    """Parameters as given, as the nominal model's refit bent them, and as the final model has them."""
+    """Parameters as given, of the refitted nominal model, and of the final model."""
     final = augmented if augmented is not None else refitted
     rows, marked = [], []
     for name, one in final.items():
@@ -90,7 +90,7 @@ def _moved(bent: Mapping[str, Any] | None, final: Mapping[str, Any]) -> str:
 
 
 def delays_section(delays: Mapping[str, Any], before: Mapping[str, Any] | None = None) -> Section:
-    """The delays with what tells them apart. `before` are those of the refitted nominal model, for comparison."""
+    """The delays with the evidence that separates them. `before` are those of the refitted nominal model, for comparison."""
     rows = []
     for key, name in DELAYS.items():
         if not delays.get(key):
@@ -135,7 +135,7 @@ def _lower(text: str) -> str:
 
 
 def reproduce_section(command: str, models: Mapping[str, str]) -> Section:
-    """The command line, versions of what computed it, and the models as files (title -> YAML text)."""
+    """The command line, the software versions, and the models as files (title -> YAML text)."""
     versions = [f"rhythmid {__version__}", f"Python {platform.python_version()}"]
     for package in PACKAGES:
         try:

@@ -1,6 +1,6 @@
-"""The signal path of a machine as a drawing: its slots, the elements in them, and what is missing where.
+"""The signal path of a machine as a drawing: its slots, their elements, and the missing effects.
 
-Drawn twice, lying for wide screens and paper, standing for narrow ones; the style sheet shows one of them.
+Drawn twice, horizontally for wide screens and paper, vertically for narrow screens; the style sheet shows one of them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ FLAG_LETTER = 7.6  # width of a bold letter on a flag
 
 @dataclass(frozen=True)
 class SlotContent:
-    """What stands in a slot: names of the nominal model's elements, of those found to be missing, and whether it is
+    """Content of a slot: names of the nominal model's elements, names of the missing effects, and whether the slot is
     suspected."""
 
     elements: tuple[str, ...] = ()

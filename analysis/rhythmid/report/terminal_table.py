@@ -1,4 +1,4 @@
-"""Tables on a terminal: side by side where they fit, else row under row, so that nothing is cut off."""
+"""Tables on a terminal: as columns if they fit, else as paragraphs, so that nothing is cut off."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -25,7 +25,7 @@ def print_table(
 ) -> None:
     """Print rows of plain text below their heads; the columns named in `right` are set to the right.
 
-    Where the terminal is too narrow, each row is a paragraph: its first cell, then a line for each further one.
+    If the terminal is too narrow, each row is a paragraph: its first cell, then a line for each further cell.
     """
     first, *rest = (max(map(cell_len, column)) for column in zip(heads, *rows, strict=True))
     if 1 + min(first, NAME) + sum(rest) + BORDER * len(heads) > console.width:

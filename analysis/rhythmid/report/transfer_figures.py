@@ -12,8 +12,8 @@ from rhythmid.report.quantity import number, pretty_unit, scaled
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-FAINT_CHANGE = 2.0  # [% of the peak of |G_0|] below which a change would hardly be noticed
-FAINT = 0.02  # of the peak, below which a phase means nothing
+FAINT_CHANGE = 2.0  # [% of the peak of |G_0|] below which a change is hardly visible
+FAINT = 0.02  # share of the peak below which a phase has no meaning
 STYLES = ("measured", "after", "before", "third")  # of |m| = 0, 1, 2, 3
 
 
@@ -116,7 +116,7 @@ def change_figures(
     unit: str,
     pumping: float | None,
 ) -> Columns:
-    """What an effect does to the transfer functions of a model.
+    """Effect of the missing physics on the transfer functions of a model.
 
     `before` (None where nothing was added) and `after` complex[h, n] of the harmonics `indices` (h,) at `frequency` [Hz] (n,).
     """

@@ -2,9 +2,9 @@
 
     ros2 launch rhythmid_bringup experiment.launch.py experiment:=demo.yaml [bag:=out]
 
-The launch configures and activates the excitation, which starts by itself when all is ready and the recorder is active; the
-other nodes activate themselves. When any node has ended everything is shut down, and the exit code is that
-node's (128 and the signal's number if it was killed).
+The launch configures and activates the excitation, which starts by itself when everything is ready and the recorder is active. The
+other nodes activate themselves. When any node ends, everything is shut down, and the exit code is that of
+the node (128 plus the signal's number if it was killed).
 """
 
 import atexit
@@ -37,7 +37,7 @@ def shut_down(event: ProcessExited, context: LaunchContext) -> list[Shutdown]:
 
 
 def _exit(code: int) -> None:
-    """Exit with `code`: `ros2 launch` itself knows only 0 and 1, and not of nodes."""
+    """Exit with `code`, because `ros2 launch` itself has only the exit codes 0 and 1."""
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)

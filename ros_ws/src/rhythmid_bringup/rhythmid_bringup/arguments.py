@@ -30,17 +30,17 @@ def ros_arguments(
 
 
 def remapping_arguments(names: Mapping[str, str]) -> list[str]:
-    """Arguments that give each name another."""
+    """Remapping arguments."""
     return [word for source, target in names.items() for word in ("-r", f"{source}:={target}")]
 
 
 def command(spec: NodeSpec, arguments: list[str]) -> list[str]:
-    """The command that runs the node in a process of its own."""
+    """The command that runs the node in a separate process."""
     return [sys.executable, "-P", "-m", f"{spec.package}.{spec.executable}", *arguments]
 
 
 def replacement_command(spec: NodeSpec, namespace: str, given: Sequence[str]) -> list[str]:
-    """The command of another's node in the place of `spec`: in its namespace, with its topics, and with its own parameters."""
+    """The command of a user's node in the place of `spec`: in the same namespace, with the same topics, and with the user's parameters."""
     return [*given, "--ros-args", *remapping_arguments({"__ns": namespace, **spec.remappings})]
 
 

@@ -1,4 +1,4 @@
-"""What a terminal shows of a running machine: what its twin says, and how punctual signals and nodes are; 40 columns are enough."""
+"""Terminal display of a running machine: the values of its twin, and the punctuality of signals and nodes, in at least 40 columns."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from rich.text import Text
 
 from rhythmid_nodes.diagnostics import PREFIX
 
-MODEL = "/model"  # ends the name of what a twin says of the machine
-RATE, LOST = " rate [Hz]", " lost"  # end the keys of a signal's figures
+MODEL = "/model"  # suffix of the status that a twin reports of the machine
+RATE, LOST = " rate [Hz]", " lost"  # suffixes of the keys of a signal's figures
 LATE_P99, LATE_MAX = " lateness p99 [ms]", " lateness max [ms]"
 STAGES = (
     "lateness",
     "delay_error",
     "transport",
-)  # of a node, whose lateness is one of these: the worst counts
+)  # lateness figures of a node, of which the worst is shown
 LATE_COUNTS = ("late", "late_commands")
 _COLOURS = {DiagnosticStatus.OK: "green", DiagnosticStatus.WARN: "yellow", DiagnosticStatus.ERROR: "bold red"}
 
 
 def drawn(newest: Mapping[str, DiagnosticStatus]) -> RenderableType:
-    """The board: the models first, then rate and lateness of the signals that a twin hears, then those of all nodes."""
+    """The display: the models first, then rate and lateness of the signals that a twin receives, then those of all nodes."""
     if not newest:
         return Text("waiting for the twin")
     figures = {
@@ -47,7 +47,7 @@ def drawn(newest: Mapping[str, DiagnosticStatus]) -> RenderableType:
 
 
 def _model(name: str, status: DiagnosticStatus) -> list[RenderableType]:
-    """What a twin says: its sentence, and its values."""
+    """The status of a twin: its sentence, and its values."""
     table = Table(box=None, show_header=False, padding=(0, 1), pad_edge=False)
     table.add_column(overflow="fold")
     table.add_column(justify="right", overflow="fold")
@@ -66,7 +66,7 @@ def _table(*titles: str) -> Table:
 
 
 def _add_signals(table: Table, figures: Mapping[str, str]) -> None:
-    """A row for each signal that a node tells rate and lateness of."""
+    """A row for each signal whose rate and lateness a node reports."""
     for key, rate in figures.items():
         if key.endswith(RATE):
             topic = key.removesuffix(RATE)
@@ -90,7 +90,7 @@ def _add_node(table: Table, name: str, status: DiagnosticStatus, figures: Mappin
 
 
 def _short(value: str) -> str:
-    """A number with as many digits as a narrow terminal has room for; what is none stays as it is."""
+    """A number with few enough digits for a narrow terminal; other text is unchanged."""
     try:
         number = float(value)
     except ValueError:

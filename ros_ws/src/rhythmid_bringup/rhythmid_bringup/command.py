@@ -64,7 +64,7 @@ def add(app: typer.Typer) -> None:
             again = [argument for argument in sys.argv[1:] if argument != "--isolated"]
             line = isolation.isolated([sys.executable, "-m", "rhythmid.cli", *again])
             os.execvp(line[0], line)
-        try:  # ROS is slow to load, and the other commands need none
+        try:  # ROS is slow to load, and the other commands do not need it
             from rhythmid_bringup.run import console, replacements, run_alone, run_graph
         except ModuleNotFoundError as missing:
             raise not_installed("rhythmid run", str(missing.name)) from None

@@ -1,4 +1,4 @@
-"""The environment of a run: a DDS domain of its own on this machine, quick discovery, logs in its own folder."""
+"""The environment of a run: a separate DDS domain on this computer, quick discovery, logs in a separate folder."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from pathlib import Path
 
 from rhythmid.errors import InputError
 
-_DOMAINS = range(1, 101)  # Linux has ports for the domains 0 to 101; 0 is everybody's
+_DOMAINS = range(1, 101)  # Linux has ports for the domains 0 to 101; 0 is the default of all programs
 _LOCK_PORT = 22119  # port + domain, bound while a domain is taken; ament's domain_coordinator uses the same
 _FAST_DISCOVERY = Path(__file__).with_name("fastdds.xml")
 
 
 @contextmanager
 def own_domain() -> Iterator[int]:
-    """A DDS domain id that no other run on this machine has; it is given back when the block ends.
+    """A DDS domain id that no other run on this computer uses; it is released at the end of the block.
 
     Raises InputError when all are taken.
     """
@@ -35,10 +35,10 @@ def own_domain() -> Iterator[int]:
 
 
 def run_environment(given: Mapping[str, str], domain: int | None, log_folder: Path) -> dict[str, str]:
-    """`given` and what it lacks for a run; whatever the user has set stays as it is.
+    """`given` with the variables that a run needs; variables that the user has set are unchanged.
 
-    Without `domain` the nodes are on their own: everybody's domain, no supervisor. Nodes are found on this machine only, unless
-    the user has said otherwise.
+    Without `domain` the nodes run without a supervisor, in the default domain. Nodes are discovered on this computer only, unless
+    the user has set otherwise.
     """
     environment = {
         "ROS_LOG_DIR": str(log_folder),

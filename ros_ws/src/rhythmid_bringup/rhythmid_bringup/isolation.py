@@ -1,12 +1,12 @@
-"""A network of its own for a command and its children: no other process of this machine can talk to their nodes.
+"""A separate network for a command and its children: no other process on this computer can reach their nodes.
 
     python -m rhythmid_bringup.isolation COMMAND [ARGUMENT …]
 
-ROS 2 without SROS2 believes whoever speaks on its domain, and the wheels' DDS is built without security. Linux namespaces (see
-namespaces(7)) take the place: one for the network, with nothing in it but its own loopback, and one for mounts with a /dev/shm of
-its own, where DDS hands messages over. A user without the right to make them gets a user namespace around both,
-where the system allows it. Neither other users nor other programs of the same user are heard; what the same user does by other
-means than ROS, such as signals and files, is not prevented.
+ROS 2 without SROS2 trusts every participant of its domain, and the wheels' DDS is built without security. Linux namespaces (see
+namespaces(7)) are used instead: one for the network, which contains only its own loopback, and one for mounts with a separate
+/dev/shm, through which DDS transfers messages. A user without the right to create them gets a user namespace around both,
+if the system allows it. Neither other users nor other programs of the same user can reach the nodes. Other actions of the same
+user, such as signals and files, are not prevented.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from rhythmid.errors import InputError
 SIOCGIFFLAGS, SIOCSIFFLAGS = 0x8913, 0x8914  # linux/sockios.h: read and set the flags of a network interface
 IFF_UP = 0x1  # linux/if.h
 _REQUEST = struct.Struct("16sH14x")  # struct ifreq: name of the interface, flags
-_MODULE = "rhythmid_bringup.isolation"  # as Python runs it; its own name is another then
+_MODULE = "rhythmid_bringup.isolation"  # as Python runs it, which changes its own name
 _INSIDE = "--inside"  # first argument of this module once it runs within the namespaces
 
 
 def isolated(command: Sequence[str]) -> list[str]:
-    """The command line that runs `command` isolated. Raises InputError where this machine does not allow it, with the reason."""
+    """The command line that runs `command` isolated. Raises InputError with the reason if this computer does not allow it."""
     if (reason := why_not()) is not None:
         raise InputError(
             f"nodes cannot be isolated on this machine: {reason}; use a container with a network of its own"
@@ -39,7 +39,7 @@ def isolated(command: Sequence[str]) -> list[str]:
 
 
 def why_not() -> str | None:
-    """Why this machine does not let this user isolate processes; None where it does."""
+    """Why this user cannot isolate processes on this computer; None if it is possible."""
     if shutil.which("unshare") is None:
         return "the program unshare (util-linux) is missing"
     tried = subprocess.run(
@@ -57,7 +57,7 @@ def _unshare() -> list[str]:
 
 
 def _enter() -> None:
-    """Make the new namespaces usable: switch the loopback on, and put an empty folder over the shared memory of others."""
+    """Prepare the new namespaces: switch the loopback on, and mount an empty folder over the shared memory of other processes."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
         answer = fcntl.ioctl(control, SIOCGIFFLAGS, _REQUEST.pack(b"lo", 0))
         flags = _REQUEST.unpack(answer)[1]

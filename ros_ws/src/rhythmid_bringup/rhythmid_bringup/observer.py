@@ -1,4 +1,4 @@
-"""The supervisor's own node: hears /diagnostics, `run` and `lockstep/ack`, and tells the excitation to start."""
+"""The supervisor's own node: it subscribes to /diagnostics, `run` and `lockstep/ack`, and starts the excitation."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from .transitions import Transitions
 
 
 class Observer(Node):
-    """What is known of the graph.
+    """The observed state of the graph.
 
     Attributes
     ----------
-    obstacles : node name -> what keeps the node from its work ("" when it is ready), as /diagnostics says.
-    tripped : node name -> why the node stopped early, of those that did.
+    obstacles : node name -> reason why the node is not ready ("" if it is ready), from /diagnostics.
+    tripped : node name -> reason, for nodes that stopped early.
     figures : node name -> its key-value pairs, the newest.
-    heard : node name -> how many sets of them have come.
+    heard : node name -> how many sets of figures have arrived.
     run : content of the topic `run`, the newest; empty before the start.
-    excitation : brings the excitation through its states.
+    excitation : requests the state transitions of the excitation.
     acknowledged_ns : simulated time up to which the recorder has everything (lockstep).
     """
 
@@ -57,7 +57,7 @@ class Observer(Node):
         return self.run.get("state", "")
 
     def ask_start(self) -> str | None:
-        """Ask the excitation to start, unless it is being asked or has started; its refusal when there is one."""
+        """Request the start of the excitation, unless it is requested or has started; returns its refusal, if any."""
         if self._answer is None:
             if self._start.service_is_ready() and not self._started:
                 self._answer = self._start.call_async(Trigger.Request())
@@ -69,11 +69,11 @@ class Observer(Node):
         return None if response.success else response.message
 
     def lifecycle(self, node: str) -> str:
-        """The managed state of a node, as /diagnostics says; "" before."""
+        """The managed state of a node, from /diagnostics; "" before the first report."""
         return self.figures.get(node, {}).get(LIFECYCLE, "")
 
     def tell_outcome(self, failure: str, punctual: bool) -> None:
-        """Say on `run`, if there was one, why it failed, what came from strangers, and where that means something how punctual it was."""
+        """Publish on `run`, if there was one, why it failed, foreign messages, and in real time the punctuality."""
         if not self.run:
             return
         foreign = {name: told for name in self.figures if (told := self._foreign(name))}

@@ -1,4 +1,4 @@
-"""Supervised processes: output passed on line by line, ended like ros2 launch does it (SIGINT, SIGTERM, SIGKILL)."""
+"""Supervised processes: output is forwarded line by line, and processes are ended as by ros2 launch (SIGINT, SIGTERM, SIGKILL)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ GRACE = 5.0  # seconds between one signal and the next
 
 
 class Supervised:
-    """A child process in a session of its own, so that a Ctrl-C reaches the supervisor alone.
+    """A child process in its own session, so that Ctrl-C reaches only the supervisor.
 
-    `tell(name, line)` gets what it says, but for the one line that says why it refuses its input: that is `refusal`.
+    `tell(name, line)` gets its output, except the line with which it refuses its input, which is `refusal`.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Supervised:
 
     @property
     def suspended(self) -> bool:
-        """Whether it has been stopped (SIGSTOP) and cannot heed a signal that asks it to end."""
+        """Whether it has been stopped (SIGSTOP) and cannot react to a signal."""
         try:
             status = Path(f"/proc/{self._process.pid}/stat").read_text(encoding="ascii", errors="replace")
         except OSError:
@@ -64,10 +64,10 @@ class Supervised:
         return status.rpartition(")")[2].split()[0] in "Tt"
 
     def hurry(self) -> None:
-        """Let it run before others where the user has the right to; to be called before it has made threads."""
+        """Raise its priority if the user has the right; call this before it has created threads."""
         with suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, self._process.pid, _NICE)
-            # a session of its own is a scheduling group of its own, whose niceness is what counts against others
+            # each session is a scheduling group, whose niceness counts relative to others
             Path(f"/proc/{self._process.pid}/autogroup").write_text(str(_NICE), encoding="ascii")
 
     def signal(self, number: signal.Signals) -> None:
@@ -75,7 +75,7 @@ class Supervised:
             self._process.send_signal(number)
 
     def join_output(self) -> None:
-        """Wait until everything that an ended process said has been passed on."""
+        """Wait until all output of an ended process has been forwarded."""
         self._reader.join(1.0)
 
     def _pass_on(self) -> None:
@@ -88,7 +88,7 @@ class Supervised:
 
 
 def end(processes: Sequence[Supervised], meanwhile: Callable[[], None] = lambda: time.sleep(0.02)) -> None:
-    """End all processes; `meanwhile` is called while they take their time."""
+    """End all processes; `meanwhile` is called while waiting."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
         for process in processes:
             process.signal(signal.SIGKILL if process.suspended else number)

@@ -1,6 +1,6 @@
-"""How punctual a run in real time was: the part of the nodes' figures that the topic `run` repeats.
+"""Punctuality of a run in real time: the part of the nodes' figures that the topic `run` repeats.
 
-What would tell a delay that is to be found (how long an injector holds messages back) stays out.
+Figures that would reveal a delay that is to be identified (how long an injector holds messages) are left out.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def timing(figures: Mapping[str, Mapping[str, str]], said: Mapping[str, Any]) ->
     Parameters
     ----------
     figures : of every node by its name, as /diagnostics has them.
-    said : what `run` has said so far: the excitation counts for itself.
+    said : content of `run` so far, with the excitation's own counts.
     """
     found: dict[str, Any] = dict(said.get("timing", {}))
     for node, (of, late, prefix) in _STAGES.items():

@@ -1,4 +1,4 @@
-"""The report of a run: how it ended and what its nodes tell, then the recording that it left."""
+"""The report of a run: how it ended, the figures of its nodes, then the recording."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .supervisor import Observed, Outcome
 
 
 def write_report(path: Path, bag: Path, observed: Observed, outcome: Outcome) -> None:
-    """Write the page of a run that left this bag. Raises InputError where its place is not writable, or the run left nothing to read."""
+    """Write the page of a run that left this bag. Raises InputError if its place is not writable, or the run left nothing readable."""
     write_page(path, run_page(bag, observed, outcome))
 
 
 def run_page(bag: Path, observed: Observed, outcome: Outcome) -> Page:
-    """The page of a run that left this bag. Raises InputError where that is no recording."""
+    """The page of a run that left this bag. Raises InputError if this is not a recording."""
     if not bag.is_dir():
         raise InputError(f"{bag}: the run left no bag, so there is nothing to report")
     found = quality_report(bag)

@@ -25,7 +25,7 @@ from .report import write_report
 from .summary import show
 from .supervisor import Supervisor
 
-REPLACEABLE = ("plant", "command_delay", "measurement_delay")  # the others drive a run and record it
+REPLACEABLE = ("plant", "command_delay", "measurement_delay")  # the other nodes drive and record a run
 console = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
@@ -38,7 +38,7 @@ def experiment_in(path: Path) -> Runnable:
 
 
 def load(path: Path, out: Path | None) -> Runnable:
-    """The experiment with its bag's absolute path. Raises InputError when the bag's place is taken or not writable."""
+    """The experiment with its bag's absolute path. Raises InputError if the bag's place exists or is not writable."""
     experiment = experiment_in(path)
     bag = (out or experiment.record.path).absolute()
     if os.path.lexists(bag):
@@ -76,7 +76,7 @@ def run_graph(
 ) -> int:
     """Run the whole graph under supervision, with the commands `replaced` in the place of nodes; write a page `report`.
 
-    The exit code is 0 when the run came to its end or the user stopped it, 1 when a node died or the excitation
+    The exit code is 0 if the run was completed or the user stopped it, 1 if a node died or the excitation
     stopped by itself. Raises InputError when a node refuses its parameters.
     """
     require_new(report)
@@ -102,7 +102,7 @@ def run_graph(
 
 
 def mend(bag: Path) -> None:
-    """Say where the bag is; if its recorder died, bring back first what it had written."""
+    """Print the place of the bag; if its recorder died, first recover what it had written."""
     if bag.is_dir() and not (bag / "metadata.yaml").is_file():
         from rhythmid.record.recover import recover
 
@@ -131,7 +131,7 @@ def run_alone(path: Path, out: Path | None, name: str) -> int:
 
 @contextmanager
 def interruptions() -> Iterator[Callable[[], bool]]:
-    """Within the block SIGINT and SIGTERM are only noted; yields a function that says whether one came."""
+    """Within the block SIGINT and SIGTERM are only noted; yields a function that returns whether one has arrived."""
     came: list[int] = []
     before = {
         number: signal.signal(number, lambda received, _frame: came.append(received))

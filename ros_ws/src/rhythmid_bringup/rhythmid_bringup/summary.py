@@ -1,4 +1,4 @@
-"""What a run leaves on the screen: rates, lateness, losses, applied delays."""
+"""Summary of a run on the terminal: rates, lateness, losses, applied delays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Supervises the graph of an experiment: start, wait until ready, excite, watch, stop."""
+"""Supervises the graph of an experiment: start, wait until ready, excite, monitor, stop."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from .processes import Supervised, end
 
 READY_WITHIN = 180.0  # seconds; importing ROS and compiling the model take most of it on a busy machine
 STALLED_AFTER = 30.0  # seconds
-FIGURES_WITHIN = 2.0  # seconds; every node tells its figures once a second
+FIGURES_WITHIN = 2.0  # seconds; every node reports its figures once a second
 GRAPH = "graph"  # the process that holds all nodes of a composed layout
-POST_ROLL = 0.25  # seconds recorded in real time after the last response can have arrived
+POST_ROLL = 0.25  # seconds recorded in real time after the latest possible arrival of the last response
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Outcome:
 
 @dataclass
 class Observed:
-    """What the supervisor saw: the figures of every node, what `run` said last, simulated or real seconds played, and how
-    long it took."""
+    """What the supervisor observed: the figures of every node, the last content of `run`, simulated or real seconds played, and the
+    time that this took."""
 
     run: dict[str, Any] = field(default_factory=dict)
     figures: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -54,7 +54,7 @@ class Observed:
 
 
 class Supervisor:
-    """One run of the graph. `interrupted()` says whether the user wants it to stop; `replaced` has by the name of a node the
+    """One run of the graph. `interrupted()` returns whether the user wants it to stop; `replaced` gives for the name of a node the
     command that runs in its place."""
 
     def __init__(
@@ -83,7 +83,7 @@ class Supervisor:
         self._streams = any(topic not in ("run", "diagnostics") for topic in experiment.record.topics)
 
     def run(self) -> Outcome:
-        """Run to the end, and leave no process behind whatever happens."""
+        """Run to the end, and end all processes in any case."""
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         observer = Observer(self._experiment.namespace)
         self._executor = EventsExecutor()
@@ -96,7 +96,7 @@ class Supervisor:
                 told = f"nothing was heard from {', '.join(silent)} for {FIGURES_WITHIN:g} s"
                 outcome = Outcome(1, f"{outcome.sentence}; {told}")
             end([process for process in self._processes if process.name != "recorder"], self._listen)
-            end(self._processes, self._listen)  # the recorder hears the others' last words
+            end(self._processes, self._listen)  # the recorder still receives the last messages of the others
             for process in self._processes:
                 process.join_output()
             self.observed.figures, self.observed.run = observer.figures, observer.run
@@ -146,12 +146,12 @@ class Supervisor:
         dead = next((process for process in self._processes if process.returncode is not None), None)
         if dead is not None:
             dead.join_output()
-            self._listen()  # it may have said why
+            self._listen()  # it may have reported the reason
             return _cause(observer) or _death(dead)
         return Outcome(0, "stopped by the user") if self._interrupted() else None
 
     def _stopped_working(self, observer: Observer) -> Outcome | None:
-        """A node that lives and does not work; a silent one is killed, lest it wakes up and acts after the run."""
+        """A node that is alive but does not work. A silent one is killed, so that it cannot act after the run."""
         heard = {name: count for name, count in observer.heard.items() if name in self._nodes}
         silent = self._liveness.silent(time.monotonic(), heard)
         for process in self._processes:
@@ -169,7 +169,7 @@ class Supervisor:
             observer.excitation.advance(observer.lifecycle("excitation"))
 
     def _wait_until_ready(self, observer: Observer) -> Outcome | None:
-        """Until every node says that it is ready and the excitation has started; why not, if it comes to nothing."""
+        """Wait until every node is ready and the excitation has started; returns the reason if this fails."""
         patience = time.monotonic() + READY_WITHIN
         refusal: str | None = None
         with self._console.status("waiting for the nodes") as status:
@@ -193,7 +193,7 @@ class Supervisor:
         return None
 
     def _play(self, observer: Observer) -> Outcome:
-        """Until the end of the run, or of a node, or of the user's patience."""
+        """Wait for the end of the run, the end of a node, or an interruption by the user."""
         started = time.monotonic()
         columns = (
             TextColumn("{task.description}"),
@@ -240,14 +240,14 @@ class Supervisor:
         return Outcome(0 if reason == "asked to stop" else 1, f"excitation stopped: {reason}")
 
     def _record_tail(self) -> None:
-        """Go on recording until the last response has come through both delays."""
+        """Continue to record until the last response has passed both delays."""
         until = time.monotonic() + longest(self._experiment.input_delay) + POST_ROLL
         until += longest(self._experiment.measurement_delay)
         while time.monotonic() < until:
             self._listen()
 
     def _fade_out(self, observer: Observer) -> None:
-        """Let the excitation ramp down, if it still plays, before the graph goes."""
+        """Let the excitation fade out, if it still plays, before the graph is stopped."""
         if self._lockstep or observer.state != "running":
             return
         observer.excitation.deactivate()
@@ -257,8 +257,8 @@ class Supervisor:
         self._record_tail()
 
     def _tell_outcome(self, observer: Observer, outcome: Outcome) -> list[str]:
-        """Let the bag say how the run ended and how punctual it was; simulated time knows no lateness. The nodes that
-        told nothing more."""
+        """Record in the bag how the run ended and how punctual it was (there is no lateness in simulated time). Returns the nodes that
+        did not report."""
         if not observer.run:
             return []
         silent: list[str] = []
@@ -274,7 +274,7 @@ class Supervisor:
 
 
 def _cause(observer: Observer) -> Outcome | None:
-    """The node that stopped early; the excitation's stop is only a consequence of another's."""
+    """The node that stopped early; a stop of the excitation may only be a consequence of another node's stop."""
     for name, reason in observer.tripped.items():
         if name != "excitation":
             return Outcome(1, f"{name} stopped: {reason}")

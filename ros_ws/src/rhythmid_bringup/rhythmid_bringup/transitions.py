@@ -1,4 +1,4 @@
-"""Brings a managed node of the graph through its states, over its service `~/change_state`."""
+"""Requests state transitions of a managed node, over its service `~/change_state`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NEXT = {UNCONFIGURED: Transition.TRANSITION_CONFIGURE, INACTIVE: Transition.TRA
 
 
 class Transitions:
-    """Requests transitions of the node `name`, one at a time, and none again that was made: its diagnostics tell the new state later."""
+    """Requests transitions of the node `name`, one at a time and each only once, because its diagnostics report the new state later."""
 
     def __init__(self, node: Node, name: str) -> None:
         self._client = node.create_client(ChangeState, f"{name}/change_state")
@@ -27,7 +27,7 @@ class Transitions:
             self._request(_NEXT[state])
 
     def deactivate(self) -> None:
-        """Deactivate the node, which takes back what effort it gives."""
+        """Deactivate the node, which fades out its effort."""
         self._request(Transition.TRANSITION_DEACTIVATE)
 
     def _request(self, number: int) -> None:

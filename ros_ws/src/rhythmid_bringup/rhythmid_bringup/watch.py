@@ -1,4 +1,4 @@
-"""`rhythmid watch` of a running machine: the node `twin` in a process of its own, and what it says on the terminal."""
+"""`rhythmid watch` of a running machine: the node `twin` in a separate process, and its output on the terminal."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ REFRESH = 4.0  # a second
 
 
 class Board(Node):
-    """What has come on /diagnostics: the newest status of every name."""
+    """The newest status of every name on /diagnostics."""
 
     def __init__(self) -> None:
         super().__init__("watch", namespace=NAMESPACE)
@@ -88,7 +88,7 @@ def watch(**options: Any) -> int:
 
 
 def _show(process: Supervised, console: Console, interrupted: Callable[[], bool]) -> None:
-    """Draw the board until the user or the node ends it, and leave it on the screen when it was the user."""
+    """Draw the display until the user or the node ends it; it stays on the screen if the user has ended it."""
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     board, executor = Board(), EventsExecutor()
     executor.add_node(board)

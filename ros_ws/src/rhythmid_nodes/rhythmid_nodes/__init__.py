@@ -1,1 +1,1 @@
-"""ROS 2 nodes of rhythmid: plant, excitation, delay_injector, recorder. No physics and no estimator live here."""
+"""ROS 2 nodes of rhythmid: plant, excitation, delay_injector, recorder. They contain no physics and no estimator."""

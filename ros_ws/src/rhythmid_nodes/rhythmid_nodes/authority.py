@@ -1,4 +1,4 @@
-"""Who may command: one publisher a topic. A second one is named, counted, and never obeyed."""
+"""Permission to command: one publisher per topic. A second publisher is named and counted, and its messages are ignored."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from .sequence_check import SequenceCheck
 
 _LOOK_PERIOD = (
-    0.02  # seconds between two looks at who publishes: a fifth of the time in which effort has to be zero
+    0.02  # seconds between two checks of the publishers: a fifth of the time in which effort has to be zero
 )
 
 UNNAMED = "unnamed node"
@@ -19,8 +19,8 @@ UNNAMED = "unnamed node"
 
 
 class Authority:
-    """Watches who publishes on `topic`; `intrusion(reason)` is called whenever a second publisher comes, and again when its node's
-    name has come, too.
+    """Monitors the publishers of `topic`. `intrusion(reason)` is called when a second publisher appears, and again when its node's
+    name is known.
 
     Attributes
     ----------
@@ -31,13 +31,13 @@ class Authority:
         self.topic = node.resolve_topic_name(topic)
         self._node, self._intrusion = node, intrusion
         self._sequence = SequenceCheck()
-        self._told = ""  # the conflict that there is now
-        self._publishers = ""  # the newest conflict that there was
+        self._told = ""  # the present conflict
+        self._publishers = ""  # the newest conflict so far
         self._timer = node.create_timer(_LOOK_PERIOD, self._look)
 
     @property
     def foreign(self) -> int:
-        """Messages of other publishers, which were not obeyed."""
+        """Ignored messages of other publishers."""
         return self._sequence.foreign
 
     def figures(self) -> dict[str, str]:
@@ -46,7 +46,7 @@ class Authority:
         return {**said, "conflict": self._publishers} if self._publishers else said
 
     def admits(self, about: Mapping[str, Any]) -> bool:
-        """Whether a message is the one publisher's, by what the middleware says about it."""
+        """Whether a message comes from the accepted publisher, according to the middleware's information about it."""
         admitted = self._sequence.admits(about["publication_sequence_number"], self._count)
         if not admitted:
             self._look()
@@ -73,7 +73,7 @@ class Authority:
 
 
 def _name(publisher: TopicEndpointInfo) -> str:
-    """Full name of a publisher's node; the publisher's own identifier while the node's name has not come yet."""
+    """Full name of a publisher's node; the publisher's identifier until the node's name is known."""
     if "UNKNOWN" in publisher.node_name:
         return f"{UNNAMED} {bytes(publisher.endpoint_gid).hex()}"
     return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"

@@ -1,4 +1,4 @@
-"""A rosbag2 bag written while messages come in: one thread owns the file, and a crash costs at most the last second."""
+"""A rosbag2 bag that is written during a run: one thread owns the file, and a crash loses at most the last second."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _DRAIN_PERIOD = 0.1
 
 
 def running_distro() -> str:
-    """The ROS distribution that runs here; its Python wheels do not set the variable by which an installation tells."""
+    """The running ROS distribution; its Python wheels do not set the variable that an installation sets."""
     return os.environ.get("ROS_DISTRO") or STANDARD_DISTRO
 
 
@@ -53,9 +53,9 @@ class Storage:
     kind
         `mcap` or `sqlite3`.
     flush_period
-        Seconds after which what was written survives the end of the process.
+        Seconds after which written data survive the end of the process.
     queue_size
-        Messages waiting at most; more are dropped.
+        Largest number of waiting messages; further ones are dropped.
     max_size, max_duration
         Bytes of messages and seconds after which the next file is begun; 0: never.
     by_message_time
@@ -72,7 +72,7 @@ class Storage:
 
 
 class LiveBag(Worker):
-    """Takes messages from any thread and writes them to a new bag; counts in `dropped` what the queue could not hold."""
+    """Takes messages from any thread and writes them to a new bag; `dropped` counts the messages that did not fit into the queue."""
 
     def __init__(self, storage: Storage) -> None:
         super().__init__("bag", self._write_all)
@@ -90,7 +90,7 @@ class LiveBag(Worker):
         self._split_asked = threading.Event()
 
     def open(self) -> None:
-        """Create the bag. Raises InputError if its place is taken or cannot be written."""
+        """Create the bag. Raises InputError if its place exists or cannot be written."""
         self.start()
         self._opened.wait()
         if self.failure is not None:
@@ -112,7 +112,7 @@ class LiveBag(Worker):
             self._queue.append((topic, receive_ns, data))
 
     def split(self) -> None:
-        """Begin the next file as soon as what is queued has been written."""
+        """Begin the next file as soon as the queued messages have been written."""
         self._split_asked.set()
 
     def _write_all(self) -> None:
@@ -137,7 +137,7 @@ class LiveBag(Worker):
                 f"{path}: {error}; the recording broke off, and rhythmid recover brings back what was written"
             )
         except BaseException:
-            writer.close()  # what precedes the failure is a whole bag
+            writer.close()  # everything before the failure is a complete bag
             raise
 
     def _drain(self, writer: BagWriter) -> None:

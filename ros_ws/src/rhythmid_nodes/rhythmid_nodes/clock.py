@@ -27,7 +27,7 @@ _libc = ctypes.CDLL(None, use_errno=True)
 class Clock:
     """Nanoseconds since the Unix epoch that never step: CLOCK_MONOTONIC plus an offset taken once.
 
-    Processes of one machine that are started at different times agree but for steps of the system clock between.
+    Processes on one computer that start at different times agree, except for steps of the system clock in between.
     """
 
     def __init__(self) -> None:
@@ -46,7 +46,7 @@ class Clock:
 def _offset_ns() -> int:
     """Time since the Unix epoch minus that of CLOCK_MONOTONIC, to within the time that the closest of some readings takes.
 
-    A busy machine may interrupt a reading between the two clocks for milliseconds, which would shift every stamp.
+    On a busy computer a reading may be interrupted for milliseconds between the two clocks, which would shift every stamp.
     """
     best_ns, offset_ns = None, 0
     for _ in range(_READINGS):
@@ -59,7 +59,7 @@ def _offset_ns() -> int:
 
 
 class Worker:
-    """A thread that ends when asked, can be started again, and hands its failure to whoever watches the node."""
+    """A thread that ends on request, can be started again, and passes an exception on to the node."""
 
     def __init__(self, name: str, body: Callable[[], None], priority: int = 0) -> None:
         self.stopping = threading.Event()
@@ -76,7 +76,7 @@ class Worker:
         self._thread.start()
 
     def stop(self) -> None:
-        """Ask the thread to end, and wait until it has."""
+        """Request the end of the thread, and wait for it."""
         self.stopping.set()
         if self._thread is not None and self._thread.is_alive():
             self._thread.join()

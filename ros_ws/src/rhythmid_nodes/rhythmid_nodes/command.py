@@ -33,7 +33,7 @@ class Commander:
         self.publisher: Publisher = node.create_publisher(TYPES[kind], topic, profile)
 
     def send(self, stamp_ns: int, effort: float) -> None:
-        """Publish an effort [N or N m]; only a JointState tells the stamp [ns]."""
+        """Publish an effort [N or N m]; only a JointState contains the stamp [ns]."""
         self.publisher.publish(self._write(stamp_ns, effort))
 
 

@@ -1,8 +1,8 @@
-"""command_guard: the last node before a robot. Passes `command` on within limits, and ends what nobody renews.
+"""command_guard: the last node before a robot. It forwards `command` within limits, and ends a command that is not renewed.
 
-It sends at the robot's rate the newest command, never a backlog, as the robot's type on the robot's topic. The effort, its rate and
-the power stay within their limits whoever commands. A second commander, a command that is no number, or a machine in danger
-(see `watch`) stop it: zero effort at once, and exit code 1.
+It sends the newest command at the robot's rate, never a backlog, with the robot's type on the robot's topic. The effort, its rate and
+the power stay within their limits, whichever node commands. A second commander, a command that is not a number, or a machine in
+danger (see `watch`) stop it: zero effort at once, and exit code 1.
 """
 
 from __future__ import annotations
@@ -31,9 +31,7 @@ from .watch_parameters import PARAMETERS as WATCHED
 from .watch_parameters import limits
 
 _FAR = math.inf
-_INSIST = (
-    0.5  # seconds for which zero is sent on after the end of a command: best-effort drives may miss a message
-)
+_INSIST = 0.5  # seconds for which zero is sent after the end of a command, because best-effort drives may miss a message
 PARAMETERS = (
     RATE,
     TIME_MODE,
@@ -52,7 +50,7 @@ PARAMETERS = (
 
 
 class CommandGuard(GraphNode):
-    """Samples the newest command on its own grid; silent until the first one, and again when the last one has ended."""
+    """Samples the newest command on its own grid. It is silent before the first command, and after the last one has ended."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("command_guard", PARAMETERS, **options)
@@ -92,7 +90,7 @@ class CommandGuard(GraphNode):
         super().activate()
 
     def fade(self) -> None:
-        """Zero at once, and a while longer: what comes before the guard fades, the guard cuts."""
+        """Zero effort at once and for some time: the nodes before the guard fade out, the guard cuts off."""
         self.stand_down()
 
     def fading(self) -> bool:
@@ -120,7 +118,7 @@ class CommandGuard(GraphNode):
         return [obstacle for obstacle in found if obstacle]
 
     def stand_down(self) -> None:
-        """A guard that is ended or deactivated obeys no more, and leaves a last command of zero."""
+        """A guard that is ended or deactivated ignores commands, and sends a last command of zero."""
         self._obeys = False
         if self._given_ns:
             self._zero()
@@ -137,7 +135,7 @@ class CommandGuard(GraphNode):
         else:
             with self._lock:
                 self._commands += 1
-                # its arrival counts, not when a busy machine gets round to it
+                # the time of arrival counts, not that of processing on a busy computer
                 self._hold.renew(min(self._wall.now(), about["received_timestamp"]), sample.effort)
 
     def _on_measurement(self, data: bytes) -> None:
@@ -150,11 +148,11 @@ class CommandGuard(GraphNode):
             self._stop(danger)
 
     def _engaged(self, now_ns: int) -> bool:
-        """Whether effort is being given, or was a moment ago."""
+        """Whether effort is applied, or was shortly before."""
         return now_ns <= self._quiet_ns
 
     def _stop(self, reason: str) -> None:
-        """Zero effort at once, whatever its rate may be, and an end of the process."""
+        """Zero effort at once, regardless of the rate limit, and end of the process."""
         self._obeys = False
         self._zero()
         self.trip(reason)

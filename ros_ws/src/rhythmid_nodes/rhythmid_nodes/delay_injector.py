@@ -1,6 +1,6 @@
-"""delay_injector: passes messages on after a delay, constant or following a profile, without looking into them.
+"""delay_injector: forwards messages after a delay, constant or by a profile, without reading their content.
 
-Topics `input` and `output` are to be remapped. The order is kept: nothing overtakes, whatever the delay does.
+Remap the topics `input` and `output`. The order is kept: no message overtakes another, whatever the delay.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from .node import CATCH_UP, PRIORITY, RATE, TIME_MODE, GraphNode, run
 from .parameters import Parameter
 from .qos import AdaptiveSubscription, latched, message_type, stream
 
-_SLICE_NS = 100_000_000  # the relay looks at least so often whether it is to end
-_SETTLE_NS = 20_000_000  # after an overrun: what comes within this time has waited in the transport meanwhile
-_LOOK_NS = 1_000_000  # between two looks for it
+_SLICE_NS = 100_000_000  # the relay checks at least so often whether it should end
+_SETTLE_NS = 20_000_000  # messages that arrive within this time after an overrun have waited in the transport
+_LOOK_NS = 1_000_000  # between two checks for them
 
 DELAY = Parameter("delay", 0.0, "time by which every message is held back", "s", (0.0, 10.0), settable=True)
 PARAMETERS = (
@@ -53,7 +53,7 @@ PARAMETERS = (
 
 
 class DelayInjector(GraphNode):
-    """Holds messages back; in lockstep it adds exactly the delay to the stamp and passes them on at once."""
+    """Holds messages for the delay; in lockstep it adds exactly the delay to the stamp and forwards them at once."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("delay_injector", PARAMETERS, **options)
@@ -95,7 +95,7 @@ class DelayInjector(GraphNode):
 
     def deactivate(self) -> None:
         super().deactivate()
-        self._queue.clear()  # what was held back is not released later
+        self._queue.clear()  # held messages are not released later
 
     def figures(self) -> dict[str, str]:
         applied = self._applied_ns / self._relayed * 1e-6 if self._relayed else 0.0
@@ -131,7 +131,7 @@ class DelayInjector(GraphNode):
         for parameter in parameters:
             if parameter.name == DELAY.name:
                 try:
-                    delay = DELAY.check(parameter.value)  # ROS's own range check lets NaN pass
+                    delay = DELAY.check(parameter.value)  # ROS's own range check accepts NaN
                 except InputError as error:
                     return SetParametersResult(successful=False, reason=str(error))
                 if self.values["profile"]:
@@ -145,7 +145,7 @@ class DelayInjector(GraphNode):
         self._start_ns = json.loads(message.data).get("start_ns", self._start_ns)
 
     def _delay_at(self, stamp_ns: int) -> int:
-        """Delay [ns] of a message stamped then; before the run starts the profile's first value."""
+        """Delay [ns] of a message with this stamp; before the start of the run the profile's first value."""
         if self._profile is None:
             return self._delay_ns
         since = 0 if self._start_ns is None else stamp_ns - self._start_ns
@@ -196,7 +196,7 @@ class DelayInjector(GraphNode):
         self._error.add(max(0, released_ns - due_ns))
 
     def _leave_backlog(self, resumed_ns: int) -> None:
-        """After an overrun: keep of what has waited meanwhile only the newest."""
+        """After an overrun, keep only the newest of the messages that have waited."""
         self._await_backlog(resumed_ns)
         waited: list[tuple[int, int, bytes]] = []
         by_arrival = self.values["delay_from"] == "receive"
@@ -210,10 +210,10 @@ class DelayInjector(GraphNode):
             self._skipped += len(waited) - 1
 
     def _await_backlog(self, resumed_ns: int) -> None:
-        """Until all that has waited in the transport has been read, which takes a busy machine a while.
+        """Wait until all messages in the transport have been read, which takes some time on a busy computer.
 
-        Messages come in order, so the first one that was not due before the overrun ended comes after the backlog. It is waited for
-        as long as the machine may be late (`catch_up`). Where the delay counts from receipt, nothing tells the backlog but the time.
+        Messages arrive in order, so the first one that was not due before the end of the overrun follows the backlog. The wait for it lasts
+        as long as the computer may be late (`catch_up`). If the delay counts from receipt, the backlog is recognised only by the time.
         """
         look_ns = resumed_ns + _SETTLE_NS
         self._wall.sleep_until(look_ns)

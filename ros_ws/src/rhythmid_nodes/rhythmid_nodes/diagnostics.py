@@ -1,4 +1,4 @@
-"""/diagnostics: every node says at 1 Hz whether it is ready, what it waits for, and how well it keeps time."""
+"""/diagnostics: every node reports at 1 Hz whether it is ready, what it waits for, and its punctuality."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STOPPED = "stopped: "
 PREFIX = "rhythmid: "
 """What the name of every status begins with, by which an aggregator collects them."""
 
-_LOOK_PERIOD = 0.05  # a change of readiness is told within this time, everything else at 1 Hz
+_LOOK_PERIOD = 0.05  # a change of readiness is reported within this time, everything else at 1 Hz
 
 
 def status_name(node: str) -> str:
@@ -29,8 +29,8 @@ def status_name(node: str) -> str:
 
 
 class Diagnostics:
-    """Publishes one DiagnosticStatus for `node`: level OK, WARN while `obstacles()` names what keeps it from its work, or
-    ERROR when `tripped()` says why it stopped early.
+    """Publishes one DiagnosticStatus for `node`: level OK, WARN while `obstacles()` gives a reason why it is not ready, or
+    ERROR if `tripped()` gives the reason why it stopped early.
 
     `values()` are the key-value pairs.
     """
@@ -86,6 +86,6 @@ class Diagnostics:
         self._publisher.publish(array)
 
     def publish_last(self) -> None:
-        """The closing figures, delivered before the node goes."""
+        """The final figures, delivered before the node ends."""
         self._publish(self._message())
         self._publisher.wait_for_all_acked(Duration(seconds=0.5))

@@ -1,4 +1,4 @@
-"""What the effort may be, whoever commands it: its size, how fast it changes, and the power that it takes."""
+"""Limits of the effort, whichever node commands: its size, its rate of change, and its power."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class EffortLimits:
-    """Limits in SI units; infinite ones do not hold anything back.
+    """Limits in SI units; infinite limits have no effect.
 
     Attributes
     ----------
@@ -22,18 +22,18 @@ class EffortLimits:
     power: float = math.inf
 
     def apply(self, effort: float, before: float, elapsed: float, speed: float = 0.0) -> float:
-        """The effort that may be given instead of `effort`.
+        """The permitted effort in the place of `effort`.
 
         Parameters
         ----------
         effort : wanted [N].
         before : given last [N].
         elapsed : since then [s].
-        speed : of the joint [m/s]; not a number: unknown, and then only zero is within a finite limit of power.
+        speed : of the joint [m/s]; NaN if unknown: then only zero effort satisfies a finite limit of power.
 
         Notes
         -----
-        Where the limits contradict each other (the speed grows faster than the effort may fall) power and size win.
+        If the limits contradict each other (the speed grows faster than the effort may fall), power and size have precedence.
         """
         bound = self.size
         if self.power < math.inf:

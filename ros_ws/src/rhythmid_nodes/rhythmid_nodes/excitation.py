@@ -1,7 +1,7 @@
 """excitation: publishes u(t) on `excitation` (or `command_topic`, as `command_type`) when told to, and stops by itself when the machine is not safe.
 
-Services `~/start` and `~/stop` (std_srvs/Trigger); deactivated, it fades to zero first. In real time it listens to `joint_states` and stops at once, with a
-last command of zero, when the measurements are in danger (see `watch`), nobody listens any more, or another node commands, too.
+Services `~/start` and `~/stop` (std_srvs/Trigger); when deactivated, it first fades to zero. In real time it subscribes to `joint_states` and stops at once, with a
+last command of zero, if the measurements violate their limits (see `watch`), there is no subscriber any more, or another node commands.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class ExcitationNode(GraphNode):
         self._watch: Any = self._judge()
         self._state = "idle"  # idle -> running (-> ramping) -> finished | stopped
         self._sent = 0
-        self._lateness = Lateness(self.period_ns)  # of the commands sent, against their stamps
+        self._lateness = Lateness(self.period_ns)  # lateness of the sent commands relative to their stamps
         self._start_ns = 0
         self._fade_from: int | None = None
         self._fade_length = round(self.values["ramp"] * self.values["rate"])
@@ -109,7 +109,7 @@ class ExcitationNode(GraphNode):
             self.create_timer(0.05, self._attend)
 
     def activate(self) -> None:
-        """In lockstep a run goes on where it was; in real time the next start plays from the beginning."""
+        """In lockstep a run continues where it was; in real time the next start plays from the beginning."""
         if not self.lockstep:
             self._state, self._ended_at = "idle", None
         super().activate()
@@ -123,7 +123,7 @@ class ExcitationNode(GraphNode):
         return not self.lockstep and self._state in ("running", "ramping")
 
     def _judge(self) -> Any:
-        """What reads measurements and judges them."""
+        """Reads and judges measurements."""
         self._reader: Any = JointStateReader(self.values["joint"])
         return Watch(limits(self.values))
 
@@ -175,17 +175,17 @@ class ExcitationNode(GraphNode):
         return [obstacle for obstacle in found if obstacle]
 
     def _unheard(self) -> str:
-        """How many of those who must listen do not; empty when all do."""
+        """Message on missing subscribers; empty if there are none."""
         matched, wanted = self._output.publisher.get_subscription_count(), self.values["subscribers"]
         return f"{matched} of {wanted} subscribers of {self._authority.topic}" if matched < wanted else ""
 
     def _unrecorded(self) -> str:
-        """That the recorder is not active, where nobody attends who would know; else empty."""
+        """Message that the recorder is not active, for an unattended run; else empty."""
         waits = self._recorder is not None and self._state == "idle" and not self._recorder.active
         return f"{self.values['recorder']} is not active" if waits else ""
 
     def _other_graphs(self) -> list[str]:
-        """Namespaces of the other excitations in this DDS domain; each is told when it is seen first."""
+        """Namespaces of the other excitations in this DDS domain; each is reported once."""
         own = (self.get_name(), self.get_namespace())
         found = {space for name, space in self.get_node_names_and_namespaces() if name == own[0]} - {own[1]}
         for space in sorted(found - self._neighbours):
@@ -194,7 +194,7 @@ class ExcitationNode(GraphNode):
         return sorted(found)
 
     def stand_down(self) -> None:
-        """A node that is ended while it plays leaves a last command of zero."""
+        """A node that is ended while it plays sends a last command of zero."""
         with self._lock:
             playing = not self.lockstep and self._state in ("running", "ramping")
             if playing:
@@ -224,7 +224,7 @@ class ExcitationNode(GraphNode):
             self.done = time.monotonic() - self._ended_at > 1.0
 
     def _start(self) -> str:
-        """Start playing from the beginning; why not, if it may not."""
+        """Start playing from the beginning; returns the reason if this is refused."""
         with self._lock:
             if not self.active or self.transitions.leaving:
                 return "not active"
@@ -273,7 +273,7 @@ class ExcitationNode(GraphNode):
         return float(self._effort[index]) * self._share(index)
 
     def _share(self, index: int) -> float:
-        """How much of sample `index` is played."""
+        """Fraction of sample `index` that is played."""
         if self._fade_from is None:
             return 1.0
         return max(0.0, 1.0 - (index + 1 - self._fade_from) / max(1, self._fade_length))
@@ -289,7 +289,7 @@ class ExcitationNode(GraphNode):
         self._sent += 1
 
     def _send_lockstep(self) -> None:
-        """Send what the credit allows; after a stop, zeros up to the end, so that every stream has its full length."""
+        """Send as many samples as the credit allows; after a stop, zeros up to the end, so that every stream has its full length."""
         with self._lock:
             if not self.active or self._state not in ("running", "ramping"):
                 return
@@ -307,7 +307,7 @@ class ExcitationNode(GraphNode):
                 return
             self._sent = (
                 stamp_ns - self._start_ns
-            ) // self.period_ns  # after an overrun samples are left out
+            ) // self.period_ns  # after an overrun, samples are left out
             faded = self._fade_from is not None and self._sent - self._fade_from >= self._fade_length
             if faded or self._sent >= len(self._effort):
                 # whoever holds the last command holds nothing else from now on
@@ -338,7 +338,7 @@ class ExcitationNode(GraphNode):
             self._abort(self._wall.now(), conflict)
 
     def _abort(self, stamp_ns: int, danger: str) -> None:
-        """Halt, if it plays: the run has failed."""
+        """Stop, if it plays, because the run has failed."""
         if self._state in ("running", "ramping"):
             self.tripped = danger
             self._halt(stamp_ns, danger)

@@ -1,7 +1,7 @@
 """excitation of several joints: publishes one `command` with a reference or a force for each joint when told to.
 
-Services, states and watchfulness are those of `excitation`; the limits of positions and speeds hold for each joint. A run that ends or is
-stopped leaves references where they are, and no force.
+Services, states and supervision are those of `excitation`; the limits of positions and speeds apply to each joint. A run that ends or is
+stopped keeps the last references, and sets forces to zero.
 """
 
 from __future__ import annotations
@@ -61,12 +61,12 @@ class JointsWatch:
             )
 
     def hear(self, samples: list[Sample], arrived_ns: int) -> None:
-        """Take note of a measurement of every joint."""
+        """Store a measurement of every joint."""
         for watch, sample in zip(self._watches.values(), samples):
             watch.hear(sample, arrived_ns)
 
     def danger(self, now_ns: int) -> str:
-        """Why the machine must not be excited now, and at which joint; empty when it may."""
+        """Reason why the machine must not be excited now, and the joint; empty if it may."""
         for joint, watch in self._watches.items():
             if danger := watch.danger(now_ns):
                 return f"{joint}: {danger}"

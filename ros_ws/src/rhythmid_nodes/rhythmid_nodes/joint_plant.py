@@ -37,7 +37,7 @@ class JointCommand(NamedTuple):
 
 
 def loaded(path: str) -> tuple[JointExperiment, Machine]:
-    """An experiment and its machine. Raises InputError where either is missing."""
+    """An experiment and its machine. Raises InputError if either is missing."""
     if not path:
         raise InputError("parameter experiment is missing: name an experiment file")
     experiment = JointExperiment.load(path)
@@ -47,7 +47,7 @@ def loaded(path: str) -> tuple[JointExperiment, Machine]:
 
 
 class JointPlantNode(PlantNode):
-    """The plant node with a body in the place of the one mass. Commands keep to the `limits` of their joint's excitation."""
+    """The plant node with a body in the place of the one mass. Commands are kept within the `limits` of their joint's excitation."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(PARAMETERS, **options)
@@ -59,7 +59,7 @@ class JointPlantNode(PlantNode):
 
     def _open(self, profile: QoSProfile) -> None:
         machine, joints = self._machine, self._machine.joints
-        self._unlimited = True  # but for the limits of each joint
+        self._unlimited = True  # except for the limits of each joint
         self._field = command_field(machine)
         self._reader = JointStatesReader(joints)
         self._state_writer = JointStatesWriter(self._plant.measured, *FIELDS)

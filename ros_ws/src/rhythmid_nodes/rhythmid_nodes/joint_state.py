@@ -1,6 +1,6 @@
 """sensor_msgs/JointState of one joint as CDR bytes: read and written in place, without building a message.
 
-At 1 kHz and five hops a sample the message objects would cost more than everything else together.
+At 1 kHz and five hops per sample, message objects would take more time than everything else together.
 """
 
 from __future__ import annotations

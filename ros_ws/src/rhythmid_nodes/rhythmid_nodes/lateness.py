@@ -1,8 +1,8 @@
-"""How late things happen against their due time: counts, mean, 99th percentile, maximum in constant memory."""
+"""Lateness of events relative to their due time: counts, mean, 99th percentile, maximum in constant memory."""
 
 from __future__ import annotations
 
-PERCENTILES = (50.0, 99.0, 99.9)  # that are told
+PERCENTILES = (50.0, 99.0, 99.9)  # percentiles that are reported
 _BIN_NS = 10_000
 _BINS = 10_000
 

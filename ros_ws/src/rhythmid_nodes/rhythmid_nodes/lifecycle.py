@@ -10,7 +10,7 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode
 
-_LOOK_PERIOD = 0.02  # seconds between two looks whether the effort has faded
+_LOOK_PERIOD = 0.02  # seconds between two checks whether the effort has faded
 
 UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = "unconfigured", "inactive", "active", "finalized"
 """Labels of the states in which a node rests."""
@@ -25,8 +25,8 @@ _LEAVING = {
 
 
 class FadingTransitions:
-    """Answers requests for transitions. One that leaves `active` first has `fade()` called, and is made and answered when
-    `fading()` is over: until then the node is active. What is no transition of the present state is refused.
+    """Answers requests for transitions. A transition that leaves `active` first calls `fade()`. It is made and answered when
+    `fading()` is over; until then the node is active. A transition that the present state does not have is refused.
 
     Attributes
     ----------
@@ -39,9 +39,7 @@ class FadingTransitions:
         self._make, self._answer = service.callback, service.send_response
         service.callback, service.send_response = self._on_request, self._respond
         self._request: ChangeState.Request | None = None
-        self._held: tuple[ChangeState.Response, Any] | None = (
-            None  # the answer that waits, and to whom it goes
-        )
+        self._held: tuple[ChangeState.Response, Any] | None = None  # the waiting answer, and its recipient
         self._timer = node.create_timer(_LOOK_PERIOD, self._look)
         self._timer.cancel()
 
@@ -74,7 +72,7 @@ class FadingTransitions:
             response.success = False
 
     def _respond(self, response: ChangeState.Response, header: Any) -> None:
-        """Send an answer, or keep it until the effort has faded."""
+        """Send an answer, or hold it until the effort has faded."""
         if self._held is not None and self._held[0] is response:
             self._held = response, header
             self._timer.reset()

@@ -1,9 +1,9 @@
 """Simulated time without a clock: samples flow as fast as they are consumed, at most a credit window ahead.
 
-Time starts at 0. Each consumer announces on `lockstep/ack` (std_msgs/Header) the grid time up to which it has taken
-everything in; `frame_id` is the consumer's name. A source sends while its sample index is below the slowest consumer's
-count plus the window. As streams are FIFO and reliable and keep a window for late joiners, what is sent depends neither
-on the processes' layout nor on their speed nor on who starts first.
+Time starts at 0. Each consumer acknowledges on `lockstep/ack` (std_msgs/Header) the grid time up to which it has processed
+everything; `frame_id` is the consumer's name. A source sends while its sample index is below the slowest consumer's
+count plus the window. Streams are FIFO and reliable and keep a window for late joiners. So the data are independent of
+the processes' layout, their speed, and their order of start.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ ACK_TOPIC = "lockstep/ack"
 
 
 def block(window: int) -> int:
-    """Samples taken or made at a time. With a fifth of the window no source ever waits for an announcement that its
-    consumer holds back: at most two blocks are held back along the path."""
+    """Samples that are processed at a time. With a fifth of the window no source waits for an acknowledgement that its
+    consumer has not yet sent, because at most two blocks are held along the path."""
     return max(1, window // 5)
 
 
 class Acknowledger:
-    """Tells the sources how many samples of the grid this node has taken in, block by block and at the end."""
+    """Acknowledges to the sources how many samples of the grid this node has processed, block by block and at the end."""
 
     def __init__(self, node: Node, window: int, period_ns: int, count: int) -> None:
         self._name = node.get_name()
@@ -35,7 +35,7 @@ class Acknowledger:
         self._publisher = node.create_publisher(Header, ACK_TOPIC, latched())
 
     def taken(self, samples: int) -> None:
-        """`samples` have been taken in, all in all."""
+        """`samples` have been processed in total."""
         if samples - self._told >= self._block or (samples >= self._count > self._told):
             header = Header(frame_id=self._name)
             header.stamp.sec, header.stamp.nanosec = divmod(samples * self._period_ns, 1_000_000_000)

@@ -1,4 +1,4 @@
-"""A node whose states others manage (https://design.ros2.org/articles/node_lifecycle.html), with workers that run while it is active."""
+"""A managed node (https://design.ros2.org/articles/node_lifecycle.html), with workers that run while it is active."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .lifecycle import ACTIVE, FINALIZED, UNCONFIGURED, FadingTransitions
 
 
 class ManagedNode(LifecycleNode):
-    """Turns the transitions into the hooks below. What a hook refuses with an exception ends the process.
+    """Calls the hooks below at the transitions. An exception in a hook ends the process.
 
     A node defines `configure`, which makes its publishers, subscriptions, services, timers and workers, and where it needs more
     than that the other hooks. What `configure` has made is destroyed by the transition cleanup.
@@ -30,11 +30,11 @@ class ManagedNode(LifecycleNode):
         self._refusal: Exception | None = None  # why a transition failed
         self._waiting: deque[Callable[[], None]] = (
             deque()
-        )  # lockstep: what came while the node was not active
+        )  # lockstep: messages that arrived while the node was not active
         self.transitions = FadingTransitions(self, self.fade, self.fading)
 
     def manage(self, autostart: bool) -> None:
-        """Take what the node has now for permanent; configure it, if it starts by itself. Raises what `configure` refuses."""
+        """Treat the present entities of the node as permanent, and configure it if it starts by itself. Raises the exceptions of `configure`."""
         self._permanent = {id(entity) for entity, _ in self._entities()}
         if autostart:
             self.trigger_configure()
@@ -53,7 +53,7 @@ class ManagedNode(LifecycleNode):
     # What a node defines
 
     def configure(self) -> None:
-        """Make what the node consists of. Raises InputError for parameters that cannot be."""
+        """Create the node's publishers, subscriptions, services, timers and workers. Raises InputError for invalid parameters."""
 
     def activate(self) -> None:
         """Start the workers."""
@@ -61,23 +61,23 @@ class ManagedNode(LifecycleNode):
             worker.start()
 
     def deactivate(self) -> None:
-        """Give no more effort, and stop the workers."""
+        """Stop the effort and the workers."""
         self.stand_down()
         for worker in self.workers:
             worker.stop()
 
     def fade(self) -> None:
-        """Begin to take the effort back; called when the node is asked to leave the state active."""
+        """Begin to fade out the effort; called when the node is requested to leave the state active."""
 
     def fading(self) -> bool:
-        """Whether there is still effort to be taken back."""
+        """Whether the effort has not yet faded out."""
         return False
 
     def stand_down(self) -> None:
-        """Give no more effort, at once; called when the node is about to end, perhaps more than once."""
+        """Stop the effort at once; called before the node ends, possibly more than once."""
 
     def finish(self) -> None:
-        """Bring to its end what `configure` began."""
+        """End what `configure` has begun."""
 
     # Managed states
 
@@ -132,7 +132,7 @@ class ManagedNode(LifecycleNode):
                 destroy(entity)
 
     def _entities(self) -> list[tuple[Any, Callable[[Any], Any]]]:
-        """All that the node has at present, and how each is destroyed."""
+        """All entities of the node at present, and how each is destroyed."""
         kinds = (
             (self.publishers, self.destroy_publisher), (self.subscriptions, self.destroy_subscription),
             (self.clients, self.destroy_client), (self.services, self.destroy_service), (self.timers, self.destroy_timer),
@@ -140,8 +140,8 @@ class ManagedNode(LifecycleNode):
         return [(entity, destroy) for entities, destroy in kinds for entity in list(entities)]
 
     def while_active(self, take: Callable[..., None]) -> Callable[..., None]:
-        """`take` for messages that an inactive node does not take: in real time they are left out, in lockstep they wait,
-        and simulated time with them."""
+        """`take` for messages that an inactive node does not process: in real time they are dropped, in lockstep they wait,
+        and simulated time stands still."""
 
         def receive(*message: Any) -> None:
             if self.active:
@@ -158,5 +158,5 @@ class ManagedNode(LifecycleNode):
         return self._refusal or next(died, None)
 
     def end(self) -> None:
-        """Let the process end."""
+        """Request the end of the process."""
         self.done = True

@@ -1,4 +1,4 @@
-"""What every node of the graph has: declared parameters, diagnostics, and a way to be run and ended."""
+"""The base of all nodes of the graph: declared parameters, diagnostics, start and end."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ from .parameters import Parameter, declare
 
 _PR_SET_PDEATHSIG = 1
 _LAST_WORDS = 0.1  # seconds
-_NAMING = 2.0  # seconds that a tripped node waits for the name of a stranger, which comes after its messages
+_NAMING = (
+    2.0  # seconds that a tripped node waits for the name of a foreign node, which arrives after its messages
+)
 
 RATE = Parameter("rate", 1000, "samples per second of the common grid", "Hz", (1, 100_000))
 TIME_MODE = Parameter(
@@ -62,7 +64,7 @@ _NO_SIM_TIME = "parameter use_sim_time = True: the nodes take no time from /cloc
 
 
 def lapse_notice(timeout: float) -> str:
-    """What a node says that holds a command for `timeout` seconds at most."""
+    """Log message of a node that holds a command for at most `timeout` seconds."""
     return f"a command was not renewed within {timeout:g} s: it fades to zero"
 
 
@@ -90,7 +92,7 @@ class GraphNode(ManagedNode):
         return {}
 
     def obstacles(self) -> list[str]:
-        """What keeps the node from its work; empty when it is ready."""
+        """Reason why the node is not ready; empty if it is ready."""
         return []
 
     def _all_figures(self) -> dict[str, str]:
@@ -100,7 +102,7 @@ class GraphNode(ManagedNode):
         return self.obstacles() if self.active else [self.managed_state]
 
     def trip(self, reason: str) -> None:
-        """Stop the work for good, because of `reason`: say so, and end the process soon. What is told last counts."""
+        """Stop permanently because of `reason`: report it, and end the process soon. The last reported reason counts."""
         self.tripped = reason
         self.get_logger().error(f"stopped: {reason}")
         if UNNAMED in reason:
@@ -113,12 +115,12 @@ class GraphNode(ManagedNode):
         self.diagnostics.notice(text)
 
     def begin(self) -> None:
-        """Activate the node, once every node of the process stands, unless others are to do that."""
+        """Activate the node when every node of the process is configured, unless another program does this."""
         if self.values["autostart"]:
             self.trigger_activate()
 
     def close(self) -> None:
-        """Give no more effort, end the workers and say the last figures; the context is still valid."""
+        """Stop the effort, end the workers and report the last figures; the context is still valid."""
         if self.configured:
             self.stand_down()
             self.finish()
@@ -133,7 +135,7 @@ def _refuse_sim_time(parameters: list[RosParameter]) -> SetParametersResult:
 
 
 def _end_with_supervisor() -> None:
-    """Let the kernel send SIGINT when the supervising process dies, however it dies."""
+    """Make the kernel send SIGINT when the supervising process dies for any reason."""
     supervisor = os.environ.get("RHYTHMID_SUPERVISOR")
     if supervisor is not None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
@@ -144,7 +146,7 @@ def _end_with_supervisor() -> None:
 def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int:
     """Run the nodes in this process on one EventsExecutor until SIGINT, SIGTERM or a failure; the exit code.
 
-    0: asked to stop; 2: a parameter or other input was refused, told in one line; 1: a node stopped early, or a failure of ours.
+    0: stopped on request; 2: a parameter or other input was refused, in one line; 1: a node stopped early, or an internal error.
     """
     asked: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -1,4 +1,4 @@
-"""Whether another managed node is active, asked over its service `~/get_state`."""
+"""Whether another managed node is active, by its service `~/get_state`."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
 from rclpy.node import Node
 
-_PATIENCE = 1.0  # seconds after which a question without an answer is put again: the asked node may have died
+_PATIENCE = 1.0  # seconds after which an unanswered request is repeated, because the node may have died
 
 
 class NodeState:
-    """The state of the managed node `name`, as it was told last.
+    """The last reported state of the managed node `name`.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class NodeState:
         self._asked_at = 0.0
 
     def ask(self) -> None:
-        """Put the question, unless an answer is still to come; to be called again and again."""
+        """Send the request, unless an answer is pending; to be called repeatedly."""
         if self._answer is not None and time.monotonic() - self._asked_at < _PATIENCE:
             return
         if self._answer is not None:

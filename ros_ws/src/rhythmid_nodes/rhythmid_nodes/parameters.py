@@ -97,8 +97,8 @@ class Parameter:
 def declare(node: Node, parameters: tuple[Parameter, ...]) -> dict[str, Any]:
     """Declare `parameters` on `node` and return their values by name; None for what has no default and is not given.
 
-    Raises InputError for a value of the wrong type or out of range and for a name that the node does not know: a
-    misspelt `max_effort` must not leave the default in force on hardware.
+    Raises InputError for a value of the wrong type or out of range, and for an unknown name. Otherwise a
+    misspelt `max_effort` would leave the default in effect on hardware.
     """
     given = node._parameter_overrides  # rclpy has no public way to see what was given but never declared
     known = {parameter.name for parameter in parameters}

@@ -59,7 +59,7 @@ PARAMETERS = (
 
 
 class PlantNode(GraphNode):
-    """A thin shell: messages in and out, clock or lockstep; `rhythmid.simulation.plant.Plant` does the rest.
+    """A thin node: messages in and out, clock or lockstep. The physics is in `rhythmid.simulation.plant.Plant`.
 
     A machine of several joints has another plant, other channels and another command, see `joint_plant`; all else is the same.
     """
@@ -97,7 +97,7 @@ class PlantNode(GraphNode):
                 None  # of the plant's time; None before the first tick since activation
             )
             self._next_ns = 0  # time since the origin of the first tick after that
-            self._transport = Lateness(self.period_ns)  # by which commands acted later than they were stamped
+            self._transport = Lateness(self.period_ns)  # delay from the stamp of a command to its action
             self._done_ns = 0  # time since the origin up to which the plant has been integrated
             self._arrived: deque[tuple[int, int, Any]] = deque()
             subscribe_informed(self, JointState, "command", self._on_realtime, profile)
@@ -107,7 +107,7 @@ class PlantNode(GraphNode):
             self.workers.append(self._grid)
 
     def _open(self, profile: QoSProfile) -> None:
-        """Readers and writers of messages, their topics, and what becomes of commands."""
+        """Readers and writers of messages, their topics, and the treatment of commands."""
         self._reader: Any = JointStateReader(self.values["joint"])
         self._state_writer: Any = JointStateWriter(self.values["joint"], "position", "velocity", "effort")
         self._forcing_writer = JointStateWriter(self.values["joint"], "effort")
@@ -149,7 +149,7 @@ class PlantNode(GraphNode):
         return plant()
 
     def deactivate(self) -> None:
-        """Time stands still on the machine; the last command is gone when it goes on."""
+        """Time stands still for the machine; the last command no longer acts when it continues."""
         super().deactivate()
         if self._grid is not None:
             self._arrived.clear()
@@ -183,7 +183,7 @@ class PlantNode(GraphNode):
         return found
 
     def _accepted(self, data: bytes, about: dict[str, Any]) -> Any:
-        """The command in a message, clamped; None if it is not to be obeyed."""
+        """The command in a message, clamped; None if it has to be ignored."""
         if self.tripped or not self._authority.admits(about):
             return None
         sample = self._reader.read(data)
@@ -193,7 +193,7 @@ class PlantNode(GraphNode):
         return self._within_limits(sample)
 
     def _within_limits(self, sample: Any) -> Any:
-        """The command in a sample, clamped; None, and the node trips, where it is no number."""
+        """The command in a sample, clamped; None, and the node trips, if it is not a number."""
         if not math.isfinite(sample.effort):
             self.trip(f"a command of {sample.effort} on {self._authority.topic}")
             return None
@@ -218,7 +218,7 @@ class PlantNode(GraphNode):
             self._forcing.publish(self._forcing_writer.write(stamp_ns, forcing))
             self._samples += 1
 
-    # Lockstep: a command stamped s tells that every command up to s is known, so the plant may go on to s.
+    # Lockstep: a command with stamp s means that every command up to s is known, so the plant may continue to s.
 
     def _on_lockstep(self, data: bytes, about: dict[str, Any]) -> None:
         sample = self._accepted(data, about)
@@ -286,7 +286,7 @@ class PlantNode(GraphNode):
         self._hold.renew(self._newest_ns, left)
 
     def _nothing(self) -> Any:
-        """The command that stands for none: zero effort."""
+        """The command that replaces a missing one: zero effort."""
         return 0.0
 
     def _fade_until(self, stamp_ns: int) -> None:
@@ -296,7 +296,7 @@ class PlantNode(GraphNode):
         self._tell_lapse()
 
     def _push(self, stamp_ns: int, effort: Any) -> None:
-        """Give an effort from a time on, as far as its rate and its power may be; the rest of it follows tick by tick."""
+        """Apply an effort from a time on, within its limits of rate and power; the rest follows tick by tick."""
         self._wanted = effort
         if not self._unlimited:
             elapsed_ns = min(stamp_ns - self._given_ns, self.period_ns)

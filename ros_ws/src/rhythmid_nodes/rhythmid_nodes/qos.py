@@ -1,4 +1,4 @@
-"""Quality of service: reliable between our own nodes, adapted to whatever a robot offers on its topics."""
+"""Quality of service: reliable between rhythmid's nodes, adapted to the offer of a robot on its topics."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .sequence_gaps import SequenceGaps
 WINDOW_MAX = 100
 """Largest credit window: more messages in flight than this overflow the transport's queues."""
 
-_DISCOVERY_PERIOD = 0.05  # seconds between two looks for the first publisher
-_ATTENTION_PERIOD_NS = 1_000_000_000  # between two looks for publishers that join later
+_DISCOVERY_PERIOD = 0.05  # seconds between two checks for the first publisher
+_ATTENTION_PERIOD_NS = 1_000_000_000  # between two checks for publishers that join later
 
 
 def stream(lockstep: bool) -> QoSProfile:
-    """A stream of samples. In lockstep late joiners get what is still in flight, so that nothing can be lost."""
+    """A stream of samples. In lockstep late joiners get the messages in transit, so that none is lost."""
     durability = DurabilityPolicy.TRANSIENT_LOCAL if lockstep else DurabilityPolicy.VOLATILE
     return QoSProfile(
         reliability=ReliabilityPolicy.RELIABLE,
@@ -54,7 +54,7 @@ def adapted(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
 
 
 def weaker(profile: QoSProfile, than: QoSProfile) -> bool:
-    """Whether a publisher that `profile` hears may be one that a subscription `than` does not."""
+    """Whether `profile` matches publishers that a subscription with `than` does not."""
     best_effort, volatile = ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE
     return (profile.reliability == best_effort != than.reliability) or (
         profile.durability == volatile != than.durability
@@ -79,7 +79,7 @@ def subscribe_informed(
     callback: Callable[[bytes, dict[str, Any]], None],
     profile: QoSProfile,
 ) -> Subscription:
-    """A raw subscription whose `callback(data, about)` gets what the middleware says about each message, too: times and number."""
+    """A raw subscription whose `callback(data, about)` also gets the middleware's information about each message: times and number."""
 
     def receive(*taken: Any) -> None:
         callback(*(taken[0] if len(taken) == 1 else taken))
@@ -91,8 +91,8 @@ def subscribe_informed(
 
 
 class AdaptiveSubscription:
-    """A raw subscription made as soon as a publisher shows its type and quality of service, and made anew when a publisher
-    comes that it would not hear.
+    """A raw subscription that is created as soon as the type and quality of service of a publisher are known, and created again for a
+    publisher that it would not match.
 
     `callback(data, received_ns)` gets a message and when the middleware received it [ns since the epoch], which on a busy
     machine is long before the callback's turn; 0 if it does not say. `found(type_name, publishers)` is called once, before
@@ -121,7 +121,7 @@ class AdaptiveSubscription:
 
     @property
     def lost(self) -> int:
-        """Messages that were sent before the newest one and did not arrive."""
+        """Number of messages that were sent before the newest one and did not arrive."""
         return self._gaps.lost
 
     def _look(self) -> None:

@@ -1,7 +1,7 @@
-"""recorder: writes topics of any type to a bag; says what it lost, and leaves a valid bag whenever it can.
+"""recorder: writes topics of any type to a bag, reports lost messages, and leaves a valid bag if possible.
 
 Services, named as rosbag2's recorder names them: `~/pause`, `~/resume`, `~/toggle_paused`, `~/is_paused` and
-`~/split_bagfile`. Their type is std_srvs/Trigger, as rosbag2_interfaces is not everywhere; of `~/is_paused` the answer
+`~/split_bagfile`. Their type is std_srvs/Trigger, because rosbag2_interfaces is not always available; the answer of `~/is_paused`
 is `success`.
 """
 
@@ -27,7 +27,7 @@ from .qos import AdaptiveSubscription, message_type
 from .stamp_order import Message, StampOrder
 from .track import Track
 
-_LOOK_PERIOD = 0.2  # seconds between two looks for topics whose names match
+_LOOK_PERIOD = 0.2  # seconds between two checks for topics whose names match
 _STATE = "run"  # what the excitation says when it begins and when it ends; it bears no stamp
 _TEXT = "std_msgs/msg/String"
 PARAMETERS = (
@@ -102,10 +102,10 @@ class Recorder(GraphNode):
             self.create_service(Trigger, f"~/{name}", _answering(act))
 
     def activate(self) -> None:
-        """Nothing to start: the bag's thread runs since the bag was opened."""
+        """Nothing to start: the bag's thread has been running since the bag was opened."""
 
     def deactivate(self) -> None:
-        """Nothing to stop: what was received is still written."""
+        """Nothing to stop: received messages are still written."""
 
     def figures(self) -> dict[str, str]:
         figures = {
@@ -180,7 +180,7 @@ class Recorder(GraphNode):
         self._inputs[topic] = AdaptiveSubscription(self, topic, taken, found)
 
     def _begin_order(self) -> None:
-        """Declare the topics, now that all are known, and let go what came before."""
+        """Declare the topics, now that all are known, and write the messages that came before."""
         present = [topic for topic in self._tracks if topic in self._found]
         for topic in present:
             self._bag.add_topic(topic, *self._found[topic])

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Sample(NamedTuple):
-    """What a message says of one joint; NaN where it says nothing. SI: ns since the epoch, m, m/s, N."""
+    """The values of one joint in a message; NaN if absent. SI: ns since the epoch, m, m/s, N."""
 
     stamp_ns: int
     position: float

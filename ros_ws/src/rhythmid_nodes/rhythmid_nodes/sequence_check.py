@@ -1,4 +1,4 @@
-"""Telling one publisher's messages from another's."""
+"""Distinguishes the messages of publishers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 
 class SequenceCheck:
-    """Tells one publisher's messages from another's by the sequence numbers that the middleware gives to each publisher's own.
+    """Distinguishes publishers by the sequence numbers that the middleware gives to the messages of each publisher.
 
     `foreign` counts the messages that were refused.
     """
@@ -16,10 +16,10 @@ class SequenceCheck:
         self._last: int | None = None
 
     def admits(self, number: int, publishers: Callable[[], int]) -> bool:
-        """Whether the message with that number goes on where the last one ended.
+        """Whether the message with that number continues the sequence.
 
-        A number out of order is taken for a loss, or for a publisher that took the place of another, while there is but one;
-        `publishers()`, how many there are, is asked only then.
+        While there is only one publisher, a number out of order counts as a loss, or as a publisher that replaced another;
+        `publishers()`, their number, is called only then.
         """
         if self._last is None or number == self._last + 1 or publishers() <= 1:
             self._last = number

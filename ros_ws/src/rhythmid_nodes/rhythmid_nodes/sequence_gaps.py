@@ -1,4 +1,4 @@
-"""Messages that never arrived, told by the sequence numbers that the middleware gives to every publisher's messages.
+"""Messages that never arrived, found by the sequence numbers that the middleware gives to every publisher's messages.
 
 The middleware's own event, message lost, is not used. In rmw_fastrtps the thread that takes the event locks the event and
 then the reader, and the thread that receives a message locks the reader and then the event, so both can wait for
@@ -23,7 +23,7 @@ class SequenceGaps:
         self._newest: list[int] = []  # of every sequence, in rising order
 
     def add(self, number: int) -> None:
-        """Take note of the sequence number of the next message."""
+        """Register the sequence number of the next message."""
         place = bisect_left(self._newest, number)
         if place:
             self.lost += number - self._newest.pop(place - 1) - 1

@@ -1,4 +1,4 @@
-"""Messages of lockstep topics put in the order of simulated time, however the middleware interleaved them."""
+"""Sorts messages of lockstep topics by simulated time, in whatever order the middleware delivered them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ Message = tuple[str, int, bytes]  # topic, simulated time [ns], serialised messa
 class StampOrder:
     """Hands out messages by stamp, and those of one stamp by the order of `topics`.
 
-    A message waits until every stream has passed its stamp. What has no stamp, the topic `state`, is said when the run
-    begins and when it ends: its first message precedes everything, the others follow everything.
+    A message waits until every stream has passed its stamp. The topic without stamps, `state`, is published at the beginning and
+    at the end of a run: its first message precedes all others, its further messages follow all others.
     """
 
     def __init__(self, topics: Sequence[str], streams: Sequence[str], state: str | None) -> None:
@@ -38,7 +38,7 @@ class StampOrder:
         heappush(self._waiting, (stamp_ns, rank, self._count, (topic, stamp_ns, data)))
 
     def ready(self) -> Iterator[Message]:
-        """The messages that none to come can precede."""
+        """The messages that no later message can precede."""
         if self._begun:
             passed = min(self._newest.values(), default=-1)
             while self._waiting and self._waiting[0][0] < passed:

@@ -1,4 +1,4 @@
-"""What came in on one recorded topic, checked by the stamps of the headers."""
+"""The messages of one recorded topic, checked by the stamps of their headers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Track:
         return self.type_name == _STREAM
 
     def add(self, stamp_ns: int) -> None:
-        """Take note of the header stamp [ns] of the next message."""
+        """Register the header stamp [ns] of the next message."""
         if self._stamped == 0:
             self._first_ns = self._previous_ns = self._last_ns = stamp_ns
         else:
@@ -37,7 +37,7 @@ class Track:
         self._stamped += 1
 
     def check(self) -> str:
-        """Rate, duplicates, steps back, longest interval; missing samples where the stamps lie on a grid."""
+        """Rate, duplicates, steps back, longest interval; missing samples if the stamps are on a grid."""
         span_ns = self._last_ns - self._first_ns
         if span_ns == 0:
             return ""

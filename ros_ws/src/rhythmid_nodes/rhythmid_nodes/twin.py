@@ -1,6 +1,6 @@
-"""twin: a model beside its machine. Listens to command, forcing and measurement; says on /diagnostics when the two part.
+"""twin: a model in parallel with its machine. It subscribes to command, forcing and measurement, and reports on /diagnostics when the two differ.
 
-A thin shell around `rhythmid.twin`: callbacks only queue, a thread of its own feeds the twin. `twin/state` carries its figures for
+A thin node around `rhythmid.twin`: callbacks only queue, and a separate thread feeds the twin. `twin/state` carries its figures for
 plotting, as a JointState whose names are the quantities and whose positions are their values.
 """
 
@@ -35,9 +35,9 @@ from .node import JOINT, TIME_MODE, GraphNode, run
 from .parameters import Parameter
 from .qos import AdaptiveSubscription, latched, message_type
 
-_PERIOD = 0.1  # s between two looks at what has come in
+_PERIOD = 0.1  # s between two reads of the queue
 _RELEASED = "command"  # topic of the commands that the last relay before the machine has released
-_LATE_NS = 10_000_000  # a message that is older when it comes in is counted as late
+_LATE_NS = 10_000_000  # a message that is older on arrival counts as late
 PARAMETERS = (
     TIME_MODE,
     JOINT,
@@ -62,7 +62,7 @@ _LEVELS = {
 
 
 class _Ear:
-    """One topic: its subscription, and how many messages came, and how late."""
+    """One topic: its subscription, and the number and lateness of its messages."""
 
     def __init__(self, node: TwinNode, topic: str) -> None:
         self.count = 0
@@ -95,7 +95,7 @@ class _Ear:
 
 
 class TwinNode(GraphNode):
-    """Feeds a `rhythmid.twin.watch.Watch` and tells what it says."""
+    """Feeds a `rhythmid.twin.watch.Watch` and reports its results."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("twin", PARAMETERS, **options)
@@ -197,7 +197,7 @@ class TwinNode(GraphNode):
             self._report()
 
     def _report(self) -> None:
-        """Tell the newest status once a second, and a change of level at once."""
+        """Publish the newest status once a second, and a change of level at once."""
         status = self._status
         if status is None:
             return
@@ -218,7 +218,7 @@ class TwinNode(GraphNode):
         self._reports.publish(message)
 
     def _diagnosis(self) -> dict[str, str]:
-        """Verdict and names of the diagnosis of what goes on; empty while there is none."""
+        """Verdict and names of the diagnosis of the present mismatch; empty if there is none."""
         event = self._watch.events.current
         if event is None or event.diagnosis is None:
             return {}

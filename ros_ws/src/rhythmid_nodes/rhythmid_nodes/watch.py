@@ -14,7 +14,7 @@ _DRIFT = 1e-3
 
 @dataclass(frozen=True)
 class Limits:
-    """What measurements must keep to; the default allows all but what is stale or no number.
+    """Limits of the measurements; the default only refuses stale measurements and values that are not numbers.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class Limits:
     speed : largest |v| [m/s].
     frozen_after : time [s] for which the position may stay exactly the same; 0: any.
     gap : largest step [s] from one stamp to the next, forwards or backwards; 0: as `stale_after`.
-    other_clock : whether the stamps come from another clock than ours. Their age then counts from the best one seen.
+    other_clock : whether the stamps come from another clock than this computer's. Their age is then relative to the smallest difference so far.
     """
 
     stale_after: float = 0.5
@@ -36,11 +36,11 @@ class Limits:
 
 
 class Watch:
-    """Judges measurements one by one (`hear`) and their absence (`danger`), from any thread. Times are nanoseconds of our clock.
+    """Judges measurements one by one (`hear`) and their absence (`danger`), from any thread. Times are nanoseconds of this computer's clock.
 
     Attributes
     ----------
-    speed : of the newest measurement [m/s], from successive positions where the message does not tell it; NaN before there is one.
+    speed : of the newest measurement [m/s], from successive positions if the message does not contain it; NaN before the first one.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -57,7 +57,7 @@ class Watch:
         )  # smallest arrival - stamp: the difference of the clocks and the shortest way
 
     def hear(self, sample: Sample, arrived_ns: int) -> None:
-        """Take note of a measurement; `danger` judges it."""
+        """Store a measurement; `danger` judges it."""
         with self._lock:
             self._take(sample, arrived_ns)
 
@@ -72,7 +72,7 @@ class Watch:
         self._newest, self._arrived_ns = sample, arrived_ns
 
     def danger(self, now_ns: int) -> str:
-        """Why the machine must not be excited now; empty when it may."""
+        """Reason why the machine must not be excited now; empty if it may."""
         with self._lock:
             sample, stale = self._newest, self._limits.stale_after
             if sample is None:

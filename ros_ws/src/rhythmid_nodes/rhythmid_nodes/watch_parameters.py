@@ -23,7 +23,7 @@ PARAMETERS = (
 
 
 def limits(values: Mapping[str, Any]) -> Limits:
-    """The limits that the values of `PARAMETERS` say. Raises InputError where the envelope is none."""
+    """The limits from the values of `PARAMETERS`. Raises InputError for an invalid envelope."""
     envelope = values["envelope"]
     if len(envelope) != 2 or not envelope[0] < envelope[1]:
         raise InputError(f"parameter envelope = {envelope}: two positions low < high in m are expected")
