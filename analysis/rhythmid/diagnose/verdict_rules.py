@@ -107,10 +107,10 @@ def _of_search(statistic: Callable[[Outcome], float], cut_short: bool) -> Callab
 VERDICT_RULES: tuple[VerdictRule, ...] = (
     VerdictRule(
         "lost",
-        "the part of the error of the chosen hypothesis that follows from its own past, as a share of what was measured",
+        "the autocorrelated part of the error of the chosen hypothesis, as a share of what was measured",
         MISSES_MOST,
         "undecided",
-        "with all that was tried the model misses {missed:.0f} % of what was measured, {lost:.0f} % in a way that follows from its own past and so is no "
+        "with every effect that was tried the model misses {missed:.0f} % of what was measured; {lost:.0f} points of this error are autocorrelated, hence not "
         "noise: something that was not recorded may act, or units, signs or the structure of the model are wrong",
         lambda found: found.lost,
     ),
@@ -141,11 +141,11 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
     ),
     VerdictRule(
         "structured",
-        "no effect is accepted: the part of the error of the refitted nominal model that follows from its own past, as a share of what was measured",
+        "no effect is accepted: the autocorrelated part of the error of the refitted nominal model, as a share of what was measured",
         LEFT,
         "undecided",
-        "the refitted nominal model misses {missed:.0f} % of what was measured, {structured:.0f} % in a way that follows from its own past and so is no "
-        "noise, and nothing that was tried explains it",
+        "the refitted nominal model misses {missed:.0f} % of what was measured; {structured:.0f} points of this error are autocorrelated, hence not noise, "
+        "and no effect that was tried explains it",
         _alone(lambda found: found.structured),
     ),
     VerdictRule(
@@ -268,7 +268,7 @@ def rule_for(found: Outcome) -> VerdictRule:
 def table() -> str:
     """The rules as a Markdown table."""
     rows = [
-        "| name | statistic | above | verdict | families told | because |",
+        "| name | statistic | above | verdict | states families | because |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     rows += [
