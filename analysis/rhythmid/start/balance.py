@@ -50,7 +50,7 @@ class Rows:
     """What drives, and the columns of the balance, of all stretches, low-pass filtered.
 
     `drives` (n,) and `columns` (n, 7) of each stretch, in the order of COLUMNS; `period` [s] of each, as the filtered motion is sampled; `margin` samples at either end
-    that the filter spoils. `span` is the travel of the position, relative to the base where that moves; where the base drives
+    that the filter spoils. `latest` [s] is by how much later what drives may act at most. `span` is the travel of the position, relative to the base where that moves; where the base drives
     (`by_base`), what drives is −a.
     """
 
@@ -61,6 +61,7 @@ class Rows:
     span: float
     bandwidth: Bandwidth
     by_base: bool
+    latest: float = LATEST_ACTION
 
     @classmethod
     def of(cls, records: Sequence[Record], bare: Model) -> "Rows":
@@ -106,7 +107,7 @@ class Rows:
             return 0.0
         period = max(self.period)
         most = min(
-            LATEST_ACTION, 0.25 * min(len(one) * p for one, p in zip(self.drives, self.period, strict=True))
+            self.latest, 0.25 * min(len(one) * p for one, p in zip(self.drives, self.period, strict=True))
         )
         delays = [number * period for number in range(1, int(most / period) + 1)]
         at_once = self.fit(names)

@@ -163,6 +163,14 @@ def meaning_of(one: Recorded) -> Meaning:
     return Meaning(quantity, commanded, forcing, base, joint, reason.removeprefix("; "), certain)
 
 
+def is_measured_effort(one: Recorded) -> bool:
+    """Whether it is an effort as it acts: one that is said to be measured, or the current of a motor, where none was asked for."""
+    meaning = meaning_of(one)
+    if meaning.quantity != "effort" or meaning.commanded is True:
+        return False
+    return meaning.commanded is False or force_unit_of(one) == "A"
+
+
 def is_ignored(one: Recorded) -> bool:
     """Whether its name says that it is neither a motion nor what drives one."""
     return bool({*words_of(one.said), *words_of(one.topic)} & IGNORED)
