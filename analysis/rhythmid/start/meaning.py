@@ -79,7 +79,7 @@ JOINT = frozenset("joint joints".split())  # what drivers add to a joint's name 
 ROTARY = frozenset(
     "angle angles theta phi alpha torque torques tor torq tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
     "qpos qvel knee hip ankle thigh calf shoulder elbow wrist arm pan tilt roll pitch yaw pendulum winkel drehmoment drehzahl angulo "
-    "angolo couple coppia".split()
+    "angolo couple coppia odrv odrive moteus dynamixel dxl rotor".split()
 )
 LINEAR = frozenset(
     "force forces height displacement disp x z slide slider prismatic linear leg lift rail cart piston travel extension length"
@@ -89,6 +89,7 @@ POSED = frozenset(
     "des desired ref refs reference references target targets goal goals setpoint setpoints sp soll sollwert "
     "consigne consigna referencia riferimento".split()
 )  # of a motion, where nothing else is said
+DUTY = frozenset("pwm duty".split())  # of a bridge, which is set: no sensor measures it
 ELECTRICAL = {
     "V": "voltage volt volts spannung tensione tensao",
     "A": "current currents cur iq amp amps i strom corriente corrente courant",
@@ -151,6 +152,9 @@ def meaning_of(one: Recorded) -> Meaning:
         "tf2_msgs/msg/TFMessage",
     ):
         commanded = False
+    elif quantity == "effort" and (set_by := set(near) & DUTY):
+        commanded = True
+        reason += f"; a {_one(near, set_by)!r} is set, not measured"
     forcing = bool(every & FORCING)
     base = bool(every & BASE)
     if (

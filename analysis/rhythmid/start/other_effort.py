@@ -28,7 +28,7 @@ def by_other_effort(
     balanced = nominal.explained is None or nominal.explained >= 1.0 - UNEXPLAINED
     if balanced or roles.input_kind != "force":
         return roles, nominal
-    able = []
+    able: list[tuple[float, Roles, Nominal]] = []
     for other in _others(found, roles):
         changed = _with(roles, other)
         try:
@@ -39,11 +39,11 @@ def by_other_effort(
             able.append((made.explained, changed, made))
     if not able:
         return roles, nominal
-    _, best, made = max(able, key=lambda one: one[0])
+    share, best, made = max(able, key=lambda one: one[0])
     role = _driver(best)
     was, choice = roles.choices[_driver(roles)].recorded, best.choices[role]
     reason = (
-        f"the balance of forces explains {made.explained:.0%} of it, and {max(nominal.explained, 0.0):.0%} of {was}, which its name would make the "
+        f"the balance of forces explains {share:.0%} of it, and {max(nominal.explained or 0.0, 0.0):.0%} of {was}, which its name would make the "
         "effort"
     )
     return replace(best, choices={**best.choices, role: replace(choice, reason=reason)}), made
