@@ -2,8 +2,12 @@
 
 import numpy as np
 
+from rhythmid.diagnose.answer.result import Estimate, MissingEffect
+from rhythmid.diagnose.answer.untold import without_untold
+from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.identify import identify
 from rhythmid.identify.natural_size import are_told
+from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
@@ -41,3 +45,18 @@ def test_a_value_near_zero_is_told_where_it_is_small_beside_all_that_there_may_b
     assert are_told(MODEL, series, {name: (0.0, 1e-9)}) == {name}
     assert are_told(MODEL, series, {name: (0.1, 0.09)}) == {name}
     assert are_told(MODEL, series, {name: (0.1, 1e3)}) == set()
+
+
+def test_a_nuisance_that_the_records_do_not_determine_is_given_no_standard_deviation():
+    model = MODEL.with_element(load_catalogue()["coulomb_friction"], {"force": 0.08})
+    known = scales(prepare([steady(5.0, NOISE[:2], "fast")]), model)
+
+    def judged(force: float, transition: tuple[float, float]) -> list[float | None]:
+        values = {"force": Estimate(0.01, force, "N"), "transition": Estimate(*transition, "m/s")}
+        effect = MissingEffect("coulomb_friction", "force", "F", 1.0, 1.0, values)
+        return [one.std for one in without_untold((effect,), model, known)[0].parameters.values()]
+
+    tiny = 0.01 * known.velocity
+    assert judged(0.005, (0.0, 230.0)) == [0.005, None]
+    assert judged(0.005, (0.0, tiny)) == [0.005, tiny]
+    assert judged(9e9, (0.2, 0.1)) == [9e9, 0.1]

@@ -38,21 +38,20 @@ def natural_size(unit: str, known: Scales) -> float | None:
     return math.prod(sizes[name] ** power for name, power in found.items())
 
 
+def is_told(value: float, std: float, natural: float | None) -> bool:
+    """Whether something is known of a parameter: its standard deviation is below its value, or two of them are below its natural size.
+
+    Else the parameter may be absent as well as all that there is.
+    """
+    return std < (max(abs(value), (natural or 0.0) / TWO_SIDED) or 1.0)
+
+
 def are_told(
     model: Model, series: Sequence[Series], estimates: Mapping[str, tuple[float, float]]
 ) -> set[str]:
-    """Those of the `estimates`, name -> value and standard deviation, of which the records tell something.
-
-    The standard deviation is below the value, or two of them are below the natural size: else the parameter may be absent as well as all
-    that there is.
-    """
+    """Those of the `estimates`, name -> value and standard deviation, of which the records tell something; see `is_told`."""
     known, units = scales(series, model), _units(model)
-    sizes = {name: natural_size(units[name], known) or 0.0 for name in estimates}
-    return {
-        name
-        for name, (value, std) in estimates.items()
-        if std < (max(abs(value), sizes[name] / TWO_SIDED) or 1.0)
-    }
+    return {name for name, given in estimates.items() if is_told(*given, natural_size(units[name], known))}
 
 
 def sizes_of(model: Model, names: Sequence[str], series: Sequence[Series]) -> Array:
