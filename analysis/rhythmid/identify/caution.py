@@ -36,6 +36,15 @@ def not_identified(motion: float, response: float | None) -> Caution:
     )
 
 
+def none_told() -> Caution:
+    """A fit that follows the motion whatever its values: the records tell none of them."""
+    return Caution(
+        "not_identified",
+        "not identified: the model follows the records, but they determine none of its values, which could be others as well",
+        "Does what drives the machine change enough while it moves? `rhythmid design` proposes an excitation.",
+    )
+
+
 def other_unit(text: str) -> Caution:
     """All values are shifted in the way that another unit of a channel would shift them."""
     return Caution("other_unit", text, "In which unit was the channel recorded?")

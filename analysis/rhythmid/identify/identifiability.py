@@ -7,7 +7,8 @@ the response's phase B = τ_u + τ_y, and the sidebands' offset C = τ_u − δ_
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Literal
 
@@ -22,11 +23,14 @@ from rhythmid.identify.harmonic_likelihood import INPUT_DELAY, MEASUREMENT_DELAY
 from rhythmid.identify.identification import Delays, Estimate, Observables
 from rhythmid.identify.inner_delays import with_inner_delays
 from rhythmid.identify.joint import JointFit, without_forcing
+from rhythmid.identify.natural_size import are_told
 from rhythmid.identify.robust_covariance import widening
 from rhythmid.identify.sensitivity import Problem
+from rhythmid.identify.series import Series
 from rhythmid.identify.undetermined import sum_of, undetermined
 from rhythmid.ltp.limit_cycle import limit_cycle
 from rhythmid.ltp.pumping import pumping_of
+from rhythmid.model import Model
 from rhythmid.simulation.transport import physical_times
 from rhythmid.statistics import NORMAL_95
 
@@ -179,6 +183,17 @@ def delays_of(
     """
     directions = tuple(direction.words for direction in undetermined(joint.fit))
     return with_inner_delays(_of_paths(joint, forcing, offset, source, directions), joint.fit)
+
+
+def of_told_sum(delays: Delays, model: Model, series: Sequence[Series]) -> Delays:
+    """The answer without a sum of which the records tell nothing; see `are_told`. Where the delays are separable each of them is told."""
+    total = delays.sum
+    if delays.separable or total.value is None or total.std is None:
+        return delays
+    name = INPUT_DELAY if INPUT_DELAY in model.parameters else MEASUREMENT_DELAY
+    if name not in model.parameters or are_told(model, series, {name: (total.value, total.std)}):
+        return delays
+    return replace(delays, sum=Estimate(None, None, "s"))
 
 
 def _of_paths(

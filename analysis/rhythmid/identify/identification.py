@@ -242,7 +242,8 @@ class Identification(Result):
         found = sum(one.value is not None for one in self.parameters.values())
         left = percent(self.quality["nrmse"])
         if not self.usable:
-            return f"Not identified: the fit leaves {left} of the motion"
+            why = next(caution.text for caution in self.cautions if caution.name == "not_identified")
+            return why[0].upper() + why[1:]
         unseen = None if self.held_out is None else self.held_out.nrmse
         more = "" if unseen is None else f", and {percent(unseen)} of the held-out motion"
         return f"{found} of {len(self.parameters)} parameters identified; the free run leaves {left} of the motion{more}"

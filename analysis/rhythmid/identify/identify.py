@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
-from rhythmid.identify.caution import Caution, not_identified, other_unit
+from rhythmid.identify.caution import Caution, none_told, not_identified, other_unit
 from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.discretisation import with_discretisation_error
@@ -20,13 +20,13 @@ from rhythmid.identify.early_output import early_outputs
 from rhythmid.identify.effort_note import effort_note
 from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.held_out import admitted_unseen, held_out_runs
-from rhythmid.identify.identifiability import Forcing, Offset, delays_of
+from rhythmid.identify.identifiability import Forcing, Offset, delays_of, of_told_sum
 from rhythmid.identify.identification import Delays, Estimate, Identification, Shown
 from rhythmid.identify.inner_delays import dead_times
 from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit, explained
-from rhythmid.identify.large_shifts import large_shifts
+from rhythmid.identify.large_shifts import large_shifts, tells_nothing
 from rhythmid.identify.moving import moving
-from rhythmid.identify.natural_size import sizes_of
+from rhythmid.identify.natural_size import are_told
 from rhythmid.identify.own_zeros import with_own_zeros
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
 from rhythmid.identify.paper_conditions import lacks_paper_method, lacks_transfer_functions
@@ -52,7 +52,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Method = Literal["joint", "paper"]
-UNKNOWN = 1e3  # std relative to size above which a parameter is not identifiable
 CLOSED = 5.0  # standard deviations of the closure above which a note is given
 FRACTION = 0.01  # share of a sample period: a smaller closure is a numerical error, whatever its std
 SOURCES = {
@@ -279,6 +278,8 @@ class _Seen:
         """Reasons to doubt the estimates. Raises InputError where a channel is in another unit."""
         stuck = joint is not None and not joint.search.arrived
         cautions = large_shifts(self.nominal, parameters, delays, self.records)
+        if joint is not None and not stuck and nrmse <= POOR_MOTION and tells_nothing(parameters, delays):
+            return (none_told(), *cautions)
         if not stuck and nrmse <= POOR_MOTION and shift(self.nominal, fitted) <= SHIFTED:
             return cautions
         mend = check_plausible(self.nominal, self.records)
@@ -344,10 +345,11 @@ def _by_likelihood(
     joint = replace(joint, fit=fit, search=explained(fit, joint.pumping))
     own = [name for name in fit.names if name not in DELAYS]
     values = fit.model.parameters
-    sizes = dict(zip(own, sizes_of(fit.model, own, fit.run.series)))
+    series = fit.run.series
+    told = are_told(fit.model, series, {name: (values[name].value, fit.std[name]) for name in own})
     parameters = {
         name: Estimate(values[name].value, fit.std[name], values[name].unit)
-        if fit.std[name] < UNKNOWN * sizes[name]
+        if name in told
         else Estimate(None, None, values[name].unit)
         for name in own
     }
@@ -361,6 +363,7 @@ def _by_likelihood(
         else Estimate(late.std, late.uncertainty, "s").to_dict(),
     }
     delays = delays_of(joint, forcing, offset, SOURCES.get(seen.source, "the forcing"))
+    delays = of_told_sum(delays, fit.model, series)
     refused = {
         name
         for name, label in dead_times(fit.model).items()

@@ -22,6 +22,7 @@ from rhythmid.identify.harmonic_likelihood import (
     MEASUREMENT_DELAY,
     harmonic_likelihood,
 )
+from rhythmid.identify.initial_step import value_before
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.series import Series, dominant_frequency, prepare
@@ -102,7 +103,10 @@ def prepared_model(model: Model, records: Sequence[Record]) -> tuple[Model, Pump
         values = own[0].numbers
         if values["frequency"] > 0.0 and values["amplitude"] != 0.0:
             pumping = Pumping.cosine(values["amplitude"], values["frequency"], values["phase"], "model")
-    excited = any(record.input is not None and np.ptp(record.input.value) > 0.0 for record in records)
+    excited = any(
+        record.input is not None and (np.ptp(record.input.value) > 0.0 or value_before(record) is not None)
+        for record in records
+    )
     wanted = [MEASUREMENT_DELAY] if pumping is not None else []
     wanted += [INPUT_DELAY] if excited else []
     for name in wanted:
@@ -130,7 +134,10 @@ def without_forcing(model: Model) -> Model:
 
 
 def _begun(record: Record, delay: float) -> Record:
-    """The record from the time at which command and forcing are known `delay` [s] back."""
+    """The record from the time at which command and forcing are known `delay` [s] back; the whole record if it began with a step from
+    rest."""
+    if value_before(record) is not None:
+        return record
     known = [c.time[0] for c in (record.input, record.forcing) if c is not None and len(c) > 0]
     first = int(np.searchsorted(record.output.time, max(known, default=-np.inf) + delay))
     if first == 0 or first > len(record.output) // 2:

@@ -42,6 +42,12 @@ def large_shifts(
     )
 
 
+def tells_nothing(parameters: Mapping[str, Estimate], delays: Delays) -> bool:
+    """Whether there are parameters to find, and the records tell none of them, nor a delay."""
+    every = (*parameters.values(), delays.input, delays.measurement, delays.sum)
+    return bool(parameters) and all(one.value is None for one in every)
+
+
 def _values(nominal: Model, parameters: Mapping[str, Estimate]) -> Iterator[Caution]:
     for name in gains(nominal):
         found, given = parameters.get(name), nominal.value(name)

@@ -6,7 +6,7 @@ scaled by the ratio of such a force to such a motion: a damper of that size take
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from rhythmid.identify.series import Series
 from rhythmid.model import INERTIA, Model
 
 Array = NDArray[np.float64]
+TWO_SIDED = 2.0  # standard deviations to either side, within which a value lies with 95 %
 
 
 def natural_size(unit: str, known: Scales) -> float | None:
@@ -37,17 +38,38 @@ def natural_size(unit: str, known: Scales) -> float | None:
     return math.prod(sizes[name] ** power for name, power in found.items())
 
 
+def is_told(value: float, std: float, natural: float | None) -> bool:
+    """Whether something is known of a parameter: its standard deviation is below its value, or two of them are below its natural size.
+
+    Else the parameter may be absent as well as all that there is.
+    """
+    return std < (max(abs(value), (natural or 0.0) / TWO_SIDED) or 1.0)
+
+
+def are_told(
+    model: Model, series: Sequence[Series], estimates: Mapping[str, tuple[float, float]]
+) -> set[str]:
+    """Those of the `estimates`, name -> value and standard deviation, of which the records tell something; see `is_told`."""
+    known, units = scales(series, model), _units(model)
+    return {name for name, given in estimates.items() if is_told(*given, natural_size(units[name], known))}
+
+
 def sizes_of(model: Model, names: Sequence[str], series: Sequence[Series]) -> Array:
     """Sizes (p,) that scale changes of the parameters `names`: natural sizes, or the values where these are larger.
 
     A time is always scaled by the motion's period / 2π: two delays that far apart are two phases.
     """
     known = scales(series, model)
-    units = {INERTIA: "kg"} | {
-        f"{term.label}.{one.name}": one.unit for term in model.terms for one in term.element.parameters
-    }
+    units = _units(model)
     found = []
     for name in names:
         natural, value = natural_size(units[name], known), abs(model.value(name))
         found.append(natural if units[name] == "s" else max(value, natural or 0.0) or 1.0)
     return np.array(found)
+
+
+def _units(model: Model) -> dict[str, str]:
+    """Units of a translational machine, by parameter."""
+    return {INERTIA: "kg"} | {
+        f"{term.label}.{one.name}": one.unit for term in model.terms for one in term.element.parameters
+    }

@@ -15,6 +15,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import PPoly
 
 from rhythmid.errors import InputError
+from rhythmid.identify.initial_step import HISTORY, stepped, value_before
 from rhythmid.identify.inputs import Inputs, Pieces
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.spread import relative_spreads
@@ -90,8 +91,14 @@ class Series:
 
     @cached_property
     def commanded(self) -> bool:
-        """Whether the command changes during the series: a constant command is no excitation."""
-        return bool(np.ptp(self._told(self.command)) > 0.0)
+        """Whether the command changes during the series, or changed at its start: a constant command is no excitation."""
+        told = self._told(self.command)
+        if (
+            self.command is not None
+            and self.time[0] - HISTORY <= self.command.x[0] + self.period < self.time[0]
+        ):
+            told = np.append(told, self.command(self.command.x[0]))
+        return bool(np.ptp(told) > 0.0)
 
     @cached_property
     def driven(self) -> bool:
@@ -286,9 +293,11 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
                 f"{record.name}: has only {len(time)} samples of the output; at least 16 are needed"
             )
         period = nominal_period(np.diff(time))
-        command = None
+        command, before = None, value_before(record)
         if record.input is not None and len(record.input.time) > 1:
-            if record.input_kind == "base_displacement" and record.hold == "zero":
+            if before is not None:
+                command = stepped(record, before)
+            elif record.input_kind == "base_displacement" and record.hold == "zero":
                 command = _spline_of(record.input.time, record.input.value)
             elif record.input_kind == "reference" and record.hold == "zero":
                 command = continuous(*_held_before(record.input.time, record.input.value), "zero")

@@ -8,11 +8,14 @@ NOT_SI = {
     "mm": (1e-3, "m"), "cm": (1e-2, "m"), "um": (1e-6, "m"), "µm": (1e-6, "m"), "km": (1e3, "m"), "in": (0.0254, "m"),
     "mm/s": (1e-3, "m/s"), "cm/s": (1e-2, "m/s"), "deg": (math.pi / 180, "rad"), "deg/s": (math.pi / 180, "rad/s"),
     "rpm": (math.pi / 30, "rad/s"), "mN": (1e-3, "N"), "kN": (1e3, "N"), "lbf": (4.4482216152605, "N"),
-    "mNm": (1e-3, "N*m"), "g": (9.80665, "m/s^2"), "mm/s^2": (1e-3, "m/s^2"),
+    "mNm": (1e-3, "N*m"), "g": (9.80665, "m/s^2"), "mm/s^2": (1e-3, "m/s^2"), "in/s": (0.0254, "m/s"), "in/s^2": (0.0254, "m/s^2"),
+    "ft": (0.3048, "m"), "ft/s": (0.3048, "m/s"), "ft/s^2": (0.3048, "m/s^2"), "kip": (4448.2216152605, "N"),
+    "cm/s^2": (1e-2, "m/s^2"), "km/h": (1.0 / 3.6, "m/s"), "%": (1e-2, "1"),
 }  # fmt: skip
 FURTHER = {
     "mrad": (1e-3, "rad"), "rev": (2 * math.pi, "rad"), "deg/s^2": (math.pi / 180, "rad/s^2"), "Ncm": (1e-2, "N*m"),
     "mA": (1e-3, "A"), "mV": (1e-3, "V"), "mrad/s": (1e-3, "rad/s"), "rps": (2 * math.pi, "rad/s"), "Nmm": (1e-3, "N*m"),
+    "rev/s": (2 * math.pi, "rad/s"), "lbf*ft": (1.3558179483314, "N*m"), "lbf*in": (0.1129848290276, "N*m"),
     "ms": (1e-3, "s"), "us": (1e-6, "s"), "ns": (1e-9, "s"), "min": (60.0, "s"),
 }  # fmt: skip
 SI = ("s", "m", "rad", "N", "N*m", "m/s", "rad/s", "m/s^2", "rad/s^2", "A", "V", "kg")
@@ -23,6 +26,9 @@ SPELLINGS = {
     "nanoseconds": "ns", "milliseconds": "ms", "microseconds": "us", "radians": "rad", "radian": "rad", "newtons": "N", "newtonmeters": "Nm", "newtonmeter": "Nm", "meter": "m",
     "meters": "m", "metre": "m", "metres": "m", "newton": "N", "amp": "A", "amps": "A", "volt": "V", "volts": "V",
     "rads": "rad/s", "mps": "m/s", "radps": "rad/s", "degps": "deg/s", "r/min": "rpm", "1/min": "rpm", "rev/min": "rpm",
+    "inch": "in", "inches": "in", "feet": "ft", "foot": "ft", "kips": "kip", "klbf": "kip", "lbs": "lbf", "lb": "lbf", "kmh": "km/h",
+    "percent": "%", "ftlb": "lbf*ft", "ftlbf": "lbf*ft", "lbft": "lbf*ft", "lbfft": "lbf*ft", "inlb": "lbf*in", "inlbf": "lbf*in",
+    "lbin": "lbf*in", "lbfin": "lbf*in",
     "rpm": "rpm", "deg": "deg", "rad": "rad",  # in any case: RPM, Deg
 }  # fmt: skip
 # after an underscore, in any case; without those that are also words or other quantities: _in, _g, _min, _rev
@@ -131,7 +137,7 @@ def _unit(text: str) -> tuple[str, float] | None:
     """SI unit and factor of a written unit; None where it is unknown."""
     text = text.strip().replace(" per ", "/").replace("²", "^2").replace("^2", "²").replace("**2", "²")
     text = re.sub(r"(?<=s)2$", "²", text)
-    parts = [re.sub(r"[\s·*⋅.]", "", part) for part in text.split("/")]
+    parts = [re.sub(r"[\s·*⋅.-]", "", part) for part in text.split("/")]
     parts = [SPELLINGS.get(part, SPELLINGS.get(part.lower(), part)) for part in parts]
     plain = "/".join(parts).replace("²", "^2")
     plain = SPELLINGS.get(plain, SPELLINGS.get(plain.lower(), plain))

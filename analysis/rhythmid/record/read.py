@@ -24,6 +24,7 @@ from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
 from rhythmid.record.record import FEWEST_COMMON_SAMPLES, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
+from rhythmid.record.stale_rows import without_stale_rows
 from rhythmid.record.standstill import is_driven
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
 from rhythmid.record.time_origin import CALENDAR, counted_from, origin_of
@@ -106,8 +107,7 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
 def read_bag(bag: Bag, signals: Signals | None = None) -> Record:
     """Read a record from a bag. Raises InputError as `read_record` does."""
     chosen = signals or Signals.default()
-    wanted = _fields(chosen)
-    run: list[bytes] = []
+    wanted, run = _fields(chosen), list[bytes]()
     blocks = bag.blocks(lambda topic: topic.name in wanted or is_run(topic))
     columns = read_columns(_divert_run(blocks, run), wanted)
     description, notes = _description(run)
@@ -146,7 +146,7 @@ def read_tables(signals: Signals) -> Record:
     tables = {
         file: Table.load(file) for source in signals.channels.values() if (file := source.file) is not None
     }
-    made: dict[str, Samples] = {}
+    made, stale = dict[str, Samples](), dict[str, None]()
     merged = {file: _is_merged(table, signals) for file, table in tables.items()}
     for role, source in signals.channels.items():
         assert source.file is not None
@@ -166,18 +166,20 @@ def read_tables(signals: Signals) -> Record:
             raise InputError(
                 f"{source.place}{table.path}: time is not finite in row {int(np.argmin(np.isfinite(time)))}"
             )
-        value = _in_unit(value, source)
+        time, value, old = without_stale_rows(time, _in_unit(value, source), table.path.name)
+        stale |= old
         if merged[source.file] or is_sampled_rarely(value):  # its empty cells are no samples
             time, value = time[~np.isnan(value)], value[~np.isnan(value)]
         made[role] = Samples(source, time, value)
     assert signals.path is not None
     name = table_name(signals.path)
-    if name == "signals":
-        name = signals.path.resolve().parent.name  # the folder's name is more specific
-    told = (note for table in tables.values() for note in table.notes)
-    quality = Quality({}, notes=(*unit_notes(signals), *told))
+    name = (
+        signals.path.resolve().parent.name if name == "signals" else name
+    )  # the folder's name is more specific
     clocks = {(source.file, source.clock(signals.time)) for source in signals.channels.values()}
     first = min((float(samples.time.min()) for samples in made.values() if len(samples.time)), default=0.0)
+    told = [note for table in tables.values() for note in table.notes]
+    quality = Quality({}, notes=(*unit_notes(signals, first >= CALENDAR), *told, *stale))
     if first >= CALENDAR:  # the used part starts with its first row
         made = {role: replace(samples, time=samples.time - first) for role, samples in made.items()}
     record = _record(name, made, signals, SPLIT, quality)

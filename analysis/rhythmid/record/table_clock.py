@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,8 @@ FORWARD = 0.99  # least share of forward steps of a time
 LONGEST_STEP = 0.5
 # days since 1900 in the years 2000 to 2100: values in this range with steps of at most a second are a spreadsheet's time
 SERIAL_DAYS = (36526.0, 73051.0)
+DATED = (946684800.0, 4102444800.0)  # seconds since 1970 of the same years
+UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))  # in which times are written
 NANOSECOND = 1e-9  # [s] smallest unit in which times are written
 MOSTLY_FORWARD = 0.9  # the same for a time that restarts with each of several recordings
 
@@ -152,7 +155,19 @@ def named_clock(name: str, value: Array) -> tuple[Clock, str]:
     scale, why = heading.scale, f"its heading says {heading.written}" if heading.unit else ""
     if not why:
         scale, why = _guessed_scale(value)
+    elif not _is_dated(value, scale):
+        for other, unit in UNITS:
+            if _is_dated(value, other):
+                when = datetime.fromtimestamp(float(value[0]) * other, UTC).date()
+                why = f"its heading says {heading.written}, but as {unit} it is a date ({when}), so that {unit} is taken"
+                scale = other
     return Clock("column", column=name, scale=scale), f"called a time, and goes forward; {why}"
+
+
+def _is_dated(value: Array, scale: float) -> bool:
+    """Whether a time whose unit is `scale` s counts from 1970 to our years, by steps that a recorder may make."""
+    step = float(np.median(np.diff(value))) * scale
+    return DATED[0] <= float(value[0]) * scale <= DATED[1] and 0.0 < step < LONGEST_STEP
 
 
 def _guessed_scale(value: Array) -> tuple[float, str]:
@@ -163,7 +178,7 @@ def _guessed_scale(value: Array) -> tuple[float, str]:
             DAY,
             f"steps of {step:.4g} from {value[0]:.6g} are taken to be days, as a spreadsheet counts them",
         )
-    for scale, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
+    for scale, unit in UNITS[:-1]:
         if step * scale < LONGEST_STEP:
             return scale, f"steps of {step:.4g} are taken to be {unit}"
     return NANOSECOND, f"steps of {step:.4g} are taken to be ns"

@@ -54,8 +54,8 @@ class Rows:
 
     `drives` (n,) and `columns` (n, 7) belong to each stretch, in the order of COLUMNS. `period` [s] is the sample
     period of the filtered motion, `margin` the number of samples at either end that are affected by the filter.
-    `span` is the travel of the position, relative to a moving base. Where the base drives the machine (`by_base`),
-    the driving signal is −a.
+    `latest` [s] is the longest delay of the driving signal. `span` is the travel of the position, relative to a moving base.
+    Where the base drives the machine (`by_base`), the driving signal is −a.
     """
 
     drives: tuple[Array, ...]
@@ -65,6 +65,7 @@ class Rows:
     span: float
     bandwidth: Bandwidth
     by_base: bool
+    latest: float = LATEST_ACTION
 
     @classmethod
     def of(cls, records: Sequence[Record], bare: Model) -> "Rows":
@@ -112,7 +113,7 @@ class Rows:
             return 0.0
         period = max(self.period)
         most = min(
-            LATEST_ACTION, 0.25 * min(len(one) * p for one, p in zip(self.drives, self.period, strict=True))
+            self.latest, 0.25 * min(len(one) * p for one, p in zip(self.drives, self.period, strict=True))
         )
         delays = [number * period for number in range(1, int(most / period) + 1)]
         at_once = self.fit(names)

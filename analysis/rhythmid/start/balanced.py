@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from rhythmid.elements.force.pendulum_gravity import LEAST_SWING
 from rhythmid.model import Model
 from rhythmid.record.record import Record
-from rhythmid.start.balance import Law, Rows
+from rhythmid.start.balance import LATEST_ACTION, Law, Rows
 
 UNEXPLAINED = 0.8  # largest unexplained share of the driving signal for which the balance's values are used
 DEGREE = math.pi / 180.0  # rad
@@ -31,16 +31,23 @@ class Balanced:
 
 
 def balance_of(
-    records: Sequence[Record], bare: Model, rotary: bool, driver: str, unit_told: bool
+    records: Sequence[Record],
+    bare: Model,
+    rotary: bool,
+    driver: str,
+    unit_told: bool,
+    latest: float = LATEST_ACTION,
 ) -> Balanced:
-    """The balance of records driven by the channel `driver`; `unit_told` says whether the unit of the position is known.
+    """The balance of records driven by the channel `driver`, which acts at most `latest` [s] after it was recorded; `unit_told` says
+    whether the unit of the position is known.
 
     Raises InputError where the records are too short or have no driving signal.
     """
-    found = _of_either_sign(records, bare, rotary, driver)
+    found = _of_either_sign(records, bare, rotary, driver, latest)
     if unit_told or not rotary or any(one.output_kind != "position" for one in records):
         return found
-    other = _of_either_sign([_scaled(one, DEGREE) for one in records], bare, rotary, driver)
+    degrees = [_scaled(one, DEGREE) for one in records]
+    other = _of_either_sign(degrees, bare, rotary, driver, latest)
     if other.kind == "pendulum" and other.law.left <= UNEXPLAINED and other.law.earns_place(found.law):
         doubt = (
             f"with the output in degrees (scale: {DEGREE:.9g}) the balance of forces explains {other.explained} of the {driver}, in rad "
@@ -58,9 +65,11 @@ def _scaled(record: Record, scale: float) -> Record:
     return replace(record, output=replace(record.output, value=record.output.value * scale), velocity=None)
 
 
-def _of_either_sign(records: Sequence[Record], bare: Model, rotary: bool, driver: str) -> Balanced:
+def _of_either_sign(
+    records: Sequence[Record], bare: Model, rotary: bool, driver: str, latest: float
+) -> Balanced:
     """The balance, with the opposite sign of the driving signal where only that explains the motion."""
-    rows = Rows.of(records, bare)
+    rows = replace(Rows.of(records, bare), latest=latest)
     plain = Balanced(rows, *restoring(records, rows, rotary, inertial=True))
     turned = None if rows.by_base else _reversed(records, rows, plain.law, rotary)
     if turned is None:

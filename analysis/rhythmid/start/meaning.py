@@ -79,7 +79,7 @@ JOINT = frozenset("joint joints".split())  # added by drivers to joint names arb
 ROTARY = frozenset(
     "angle angles theta phi alpha torque torques tor torq tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
     "qpos qvel knee hip ankle thigh calf shoulder elbow wrist arm pan tilt roll pitch yaw pendulum winkel drehmoment drehzahl angulo "
-    "angolo couple coppia".split()
+    "angolo couple coppia odrv odrive moteus dynamixel dxl rotor".split()
 )
 LINEAR = frozenset(
     "force forces height displacement disp x z slide slider prismatic linear leg lift rail cart piston travel extension length"
@@ -89,6 +89,7 @@ POSED = frozenset(
     "des desired ref refs reference references target targets goal goals setpoint setpoints sp soll sollwert "
     "consigne consigna referencia riferimento".split()
 )  # for a motion, where nothing else is stated
+DUTY = frozenset("pwm duty".split())  # of a bridge: it is set, no sensor measures it
 ELECTRICAL = {
     "V": "voltage volt volts spannung tensione tensao",
     "A": "current currents cur iq amp amps i strom corriente corrente courant",
@@ -152,6 +153,9 @@ def meaning_of(one: Recorded) -> Meaning:
         "tf2_msgs/msg/TFMessage",
     ):
         commanded = False
+    elif quantity == "effort" and (set_by := set(near) & DUTY):
+        commanded = True
+        reason += f"; a {_one(near, set_by)!r} is set, not measured"
     forcing = bool(every & FORCING)
     base = bool(every & BASE)
     if (
@@ -162,6 +166,14 @@ def meaning_of(one: Recorded) -> Meaning:
         base, commanded = True, None
     joint = one.joint or ("" if one.topic else joint_of_column(one.said, one.side))
     return Meaning(quantity, commanded, forcing, base, joint, reason.removeprefix("; "), certain)
+
+
+def is_measured_effort(one: Recorded) -> bool:
+    """Whether it is an effort as it acts: one that is said to be measured, or the current of a motor, where none was asked for."""
+    meaning = meaning_of(one)
+    if meaning.quantity != "effort" or meaning.commanded is True:
+        return False
+    return meaning.commanded is False or force_unit_of(one) == "A"
 
 
 def is_ignored(one: Recorded) -> bool:

@@ -13,14 +13,15 @@ from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import prepare
 from rhythmid.model import INERTIA, MASS, Model
 from rhythmid.record.record import Channel, Record
-from rhythmid.start.balance import Law, Rows
+from rhythmid.start.balance import LATEST_ACTION, Law, Rows
 from rhythmid.start.balanced import UNEXPLAINED, balance_of, restoring
-from rhythmid.start.meaning import tells_unit
+from rhythmid.start.meaning import is_measured_effort, tells_unit
 from rhythmid.start.roles import Roles
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
 from rhythmid.value import Value
 
 LAW_KEPT = 0.5  # largest unexplained share of an effort for which a controller is taken as its cause
+FEW = 3.0  # samples by which channels of one recording may be apart because of filters and buses; see `direction`
 # ratio to inertia times the motion's angular frequency, used where the balance shows no damping
 LEAST_DAMPING = 0.01
 
@@ -28,12 +29,14 @@ LEAST_DAMPING = 0.01
 @dataclass(frozen=True)
 class Nominal:
     """A model to start with, the reason for its inertia and each of its terms (by label), what could not be
-    guessed, and doubts (by label)."""
+    guessed, and doubts (by label). `explained` is the share of the driving signal that a balance of forces explains, None without
+    one."""
 
     model: Model
     reasons: dict[str, str]
     remarks: tuple[str, ...]
     doubts: dict[str, str] = field(default_factory=dict)
+    explained: float | None = None
 
 
 def nominal_of(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
@@ -69,20 +72,23 @@ def _bare(units: Units, mass: float = 1.0, fixed: bool = False) -> Model:
 def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
     """Model from recorded force and motion, by the force balance."""
     driver = "effort" if "effort" in roles.choices else "input"
+    few = FEW * max(record.output.period for record in records)
+    acts_at_once = driver == "effort" or is_measured_effort(roles.choices[driver].recorded)
+    latest = few if acts_at_once else LATEST_ACTION
+    unit_told = tells_unit(roles.choices["output"].recorded)
     try:
-        found = balance_of(
-            records, _bare(units), roles.rotary, driver, tells_unit(roles.choices["output"].recorded)
-        )
+        found = balance_of(records, _bare(units), roles.rotary, driver, unit_told, latest)
     except InputError as error:
         return _by_size(records, units, catalogue, str(error))
     law, kind, rows = found.law, found.kind, found.rows
     inertia, doubts = _shown(law, rows)
     doubts |= {INERTIA: "; ".join(found.doubts)} if found.doubts else {}
     if inertia <= 0.0:
-        return _by_size(records, units, catalogue, "the balance of forces shows no inertia")
+        found_none = "the balance of forces shows no inertia"
+        return replace(_by_size(records, units, catalogue, found_none), explained=0.0)
     if law.left > UNEXPLAINED:
         why = f"the balance of forces explains only {1.0 - law.left:.0%} of what drives"
-        return _by_size(records, units, catalogue, why)
+        return replace(_by_size(records, units, catalogue, why), explained=1.0 - law.left)
     told = f"by the balance of forces, which explains {max(0.0, 1.0 - law.left):.0%} of what drives"
     model = _bare(units, _short(inertia))
     reasons = {INERTIA: told}
@@ -93,8 +99,20 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
     elif law.delay > 0.0:
         model = model.with_element(catalogue["input_delay"], {"delay": _short(law.delay)})
         reasons["input_delay"] = "the balance is better when what drives acts so much later"
+        doubts |= _doubt_of_delay(law.delay, few)
     model, more = _forces(model, law, kind, rows, catalogue)
-    return Nominal(model, reasons | more, tuple(remarks), doubts)
+    return Nominal(model, reasons | more, tuple(remarks), doubts, 1.0 - law.left)
+
+
+def _doubt_of_delay(delay: float, few: float) -> dict[str, str]:
+    """What is doubtful about a delay [s] that is longer than a `few` samples [s]; empty of a shorter one."""
+    if delay <= few:
+        return {}
+    doubt = (
+        f"nothing but the balance tells of {1e3 * delay:.3g} ms, and friction, ripple and lags look like a delay, too: put in what is known "
+        "of the bus or the drive, or delete it"
+    )
+    return {"input_delay": doubt}
 
 
 def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
@@ -209,17 +227,19 @@ def _servo(records: Sequence[Record], roles: Roles, units: Units, catalogue: Cat
     model = _bare(units, 1.0, fixed=True)
     reasons = {INERTIA: "no force is known, so all is per unit of inertia"}
     law = _servo_law(records, roles.reference_of)
+    late = dict[str, str]()
     if law.delay > 0.0:
         model = model.with_element(catalogue["input_delay"], {"delay": _short(law.delay)})
         reasons["input_delay"] = "the balance is better when the reference acts so much later"
-    told, doubts = "the reference drives; gains by ", dict[str, str]()
+        late = _doubt_of_delay(law.delay, FEW * max(record.output.period for record in records))
+    told, doubts = "the reference drives; gains by ", late
     if law.left > UNEXPLAINED:
         told += "the frequency of the motion only"
         doubt = (
             f"a balance with the motion explains only {max(0.0, 1.0 - law.left):.0%} of the reference: see that both are what they are taken "
             "for, and put in what is known"
         )
-        doubts = {f"{roles.reference_of}_control": doubt}
+        doubts = doubts | {f"{roles.reference_of}_control": doubt}
     else:
         told += f"a balance with the motion, which explains {1.0 - law.left:.0%} of the reference"
     gain = _short(law.coefficients["gain"])

@@ -34,6 +34,8 @@ from rhythmid.start.unnamed_reference import with_reference
 from rhythmid.start.unsigned_effort import without_unsigned
 
 INTEGRAL = 0.9  # correlation above which a position and a velocity belong together
+PER_MINUTE = 0.02  # by which a ratio of one to sixty may be off: that of degrees is 5 % off
+UNTOLD = "no name or unit says it; where it turns, say so with units of rad and N*m"
 MEASURED: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
 
 
@@ -287,6 +289,8 @@ def _velocity(output: Choice, measured: Quantity, rest: list[Known]) -> Choice |
 
 
 def _degrees(ratio: float) -> str:
+    if abs(60.0 * abs(ratio) - 1.0) < PER_MINUTE:
+        return "the position may be in turns and the velocity in turns a minute: scale: 6.283185307 and 0.1047197551"
     if 40.0 < ratio < 80.0:
         return "the position may be in degrees: scale: 0.0174532925"
     if 1 / 80.0 < ratio < 1 / 40.0:
@@ -305,4 +309,4 @@ def _rotary(choices: Mapping[str, Choice], output: Recorded, of_robot: bool, ask
     answers = ["it turns (rad, N m)", "it slides (m, N)"]
     number = ask("Does the joint turn or slide?", answers if turns else answers[::-1])
     rotary = turns == (number == 0)
-    return rotary, "no name or unit says it; most joints turn" if turns else "no name or unit says it"
+    return rotary, "no name or unit says it; most joints turn" if turns else UNTOLD

@@ -23,6 +23,7 @@ from rhythmid.start.listed_joints import with_listed_joints
 from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.named_joints import with_joints
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
+from rhythmid.start.other_effort import by_other_effort
 from rhythmid.start.roles import Roles, first_answer, guess_roles
 from rhythmid.start.sides import with_sides
 from rhythmid.start.written import GUESSED, as_guessed, clock_of, model_yaml, signals_yaml
@@ -172,15 +173,31 @@ def start(
     guessed, resting = _guess_of_moving(sources, joint, rate, ask)
     remarks = tuple(f"{one}: the machine stands still, so that it is not used here" for one in resting)
     moving = [one for one in sources if one not in resting]
-    records = load_records(moving, Signals.from_text(guessed.signals, GUESSED))
-    records = [one for one in records if standstill(cleaned(one).record) is None] or records
-    records = [unwrapped(one) for one in records]
-    catalogue = load_catalogue() if catalogue is None else catalogue
-    units = _units(guessed.roles)
-    nominal = nominal_of(records, guessed.roles, units, catalogue)
+    known = load_catalogue() if catalogue is None else catalogue
+
+    def tried(roles: Roles) -> Nominal:
+        return _nominal(moving, _text(guessed.inventory, roles), roles, known)
+
+    nominal = _nominal(moving, guessed.signals, guessed.roles, known)
+    roles, nominal = by_other_effort(guessed.inventory, guessed.roles, nominal, tried)
+    if roles is not guessed.roles:
+        guessed = replace(guessed, roles=roles, signals=_text(guessed.inventory, roles))
+    units = _units(roles)
     text = model_yaml(nominal, guessed.roles, units, units not in (TRANSLATIONAL, ROTATIONAL))
-    Model.from_text(text, "model.yaml", catalogue)
+    Model.from_text(text, "model.yaml", known)
     return Start(guessed, nominal, text, remarks)
+
+
+def _text(found: Inventory, roles: Roles) -> str:
+    """signals.yaml of these roles."""
+    return signals_yaml(found, roles, _units(roles), *clock_of(found, roles))
+
+
+def _nominal(sources: Sequence[str | Path], signals: str, roles: Roles, catalogue: Catalogue) -> Nominal:
+    """The nominal model of recordings with these roles, of those in which the machine moves."""
+    records = load_records(sources, Signals.from_text(signals, GUESSED))
+    records = [one for one in records if standstill(cleaned(one).record) is None] or records
+    return nominal_of([unwrapped(one) for one in records], roles, _units(roles), catalogue)
 
 
 def _units(roles: Roles) -> Units:

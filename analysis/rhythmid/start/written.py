@@ -99,7 +99,10 @@ def signals_yaml(
 
 def _time_doubt(clock: Clock) -> list[str]:
     """A comment on a unit of times that no heading states and that is not the second."""
-    if clock.kind != "column" or clock.scale == 1.0 or heading_of(str(clock.column)).unit:
+    heading = heading_of(str(clock.column))
+    if clock.kind == "column" and heading.unit and heading.scale != clock.scale:
+        return comment(f"  CHECK: the unit of its heading, {heading.written}, is not the one that is taken.")
+    if clock.kind != "column" or clock.scale == 1.0 or heading.unit:
         return []
     return comment(
         "  CHECK: no heading tells the unit of the times; the size of their steps is all that says it."

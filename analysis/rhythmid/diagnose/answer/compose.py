@@ -20,6 +20,7 @@ from rhythmid.diagnose.answer.result import (
     Scored,
     Untried,
 )
+from rhythmid.diagnose.answer.untold import without_untold
 from rhythmid.diagnose.answer.wording import freed_value, location_of, recalibrated, summary_of
 from rhythmid.diagnose.case import EXPLAINED, Case
 from rhythmid.diagnose.delays import delays_of
@@ -30,6 +31,7 @@ from rhythmid.diagnose.verdict import Decision
 from rhythmid.identify.held_out_zeros import held_out_zero_notes
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, rerun
+from rhythmid.identify.record_scales import scales
 from rhythmid.identify.repeats import noise_from_repeats
 from rhythmid.identify.series import Series
 from rhythmid.identify.zero_estimates import zeros_told
@@ -72,6 +74,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     best = found.best
     fit = found.fit
     missing = missing_effects(fit.model, decision, lambda name: estimated(fit, name))
+    missing = without_untold(missing, fit.model, scales(series, fit.model))
     plain = FitQuality(found.nominal.nrmse(), contest.nominal.heldout_nrmse)
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
     rivals = [t for t in found.trials if len(t.added) == len(best.added) and t.bic() - best.bic() < RIVALS]

@@ -14,10 +14,12 @@ from rhythmid.diagnose.answer.result import (
     Untried,
     settled,
 )
+from rhythmid.diagnose.answer.untold import without_untold
 from rhythmid.diagnose.answer.wording import NOT_LOCATED, freed_value, listed, recalibrated, summary_of
 from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.run import EffortResult
+from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.elements.places import SENTENCES
 from rhythmid.identify.inverse_dynamics.estimate import variation_of
 from rhythmid.record.elsewhere import elsewhere_notes
@@ -31,6 +33,8 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     decision, chosen, nominal = result.decision, result.chosen, result.nominal
     size = variation_of(result.search.balance)
     missing = missing_effects(chosen.fit.model, decision, lambda name: _estimate(chosen, name))
+    sizes = scales_of(result.search.balance, chosen.fit.model)
+    missing = without_untold(missing, chosen.fit.model, sizes)
     before, after = (
         FitQuality(one.fit.error / size, _error(result, one) / size) for one in (nominal, chosen)
     )

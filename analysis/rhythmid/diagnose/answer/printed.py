@@ -29,9 +29,11 @@ def show(found: Diagnosis, console: Console) -> None:
         if found.verdict == "missing_physics":  # with other verdicts the answer does not state the name
             sizes = f"probability {_probability(effect.probability)}, {sizes}"
         lines.told(effect.element, f"{effect.equation}   ({sizes})")
-        print_estimates(
-            console, "", {name: asdict(one) for name, one in effect.parameters.items()}, "parameter"
-        )
+        told = {
+            name: asdict(one) if one.std is not None else asdict(one) | {"value": None}
+            for name, one in effect.parameters.items()
+        }
+        print_estimates(console, "", told, "parameter")
     for family in found.families if found.verdict == "undecided" else ():
         sizes = f"probability {_probability(family.probability)}, {_percent(family.share)} of the mismatch"
         lines.said(f"some form of {family.family}", f"{sizes}: {', '.join(family.laws)}")
