@@ -12,6 +12,7 @@ A joint's path is a `Model` whose inertia is the body's: the one that a force al
 and dry friction that the file gives a joint become the elements of that name, where the path has none. `free:` under `body:`
 names inertial parameters that are estimated: `free: {shank.mass: {prior: {mean: 0.4, std: 0.04}}, shank.payload: {}, knee.armature: {}}`.
 A payload sits at the end of its link, for which `ends: {shank: [0, 0, -0.2]}` may give another place [m] in the link's frame.
+`gravity: [9.81, 0, 0]` [m/s^2] under `body:` is for a base that is mounted otherwise than the file says: gravity in the frame of the file's world.
 """
 
 import os
@@ -42,6 +43,7 @@ from rhythmid.value import Value, entry_of, value_of
 
 KINDS = ("mjcf", "urdf")
 LONGEST_STEP = 0.01  # [s] of an integration: ten times what contacts bear
+MOST_GRAVITY = 100.0  # [m/s^2] of a component: four times that of Jupiter (NASA, planetary fact sheet); more is another unit
 TRANSITION = (
     0.01  # [rad/s or m/s] over which the dry friction of a body's file turns, which MuJoCo holds for a jump
 )
@@ -166,6 +168,8 @@ class Machine:
         body |= {"step": self.body.step, "contacts": self.body.contacts}
         if self.body.hold:
             body["hold"] = dict(self.body.hold)
+        if self.body.mounted:
+            body["gravity"] = self.body.gravity.tolist()
         if ends := {link: self.body.ends[link].tolist() for link in self._loaded()}:
             body["ends"] = ends
         if self.inertial:
@@ -229,6 +233,8 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
     paths = {name: _path(given[name], name, body, catalogue) for name in order}
     return Machine(body, paths, inertial, kind)
 
+Gravity = Annotated[Number, Limits(ge=-MOST_GRAVITY, le=MOST_GRAVITY)]
+
 
 @dataclass(frozen=True)
 class _Body:
@@ -243,6 +249,7 @@ class _Body:
     hold: list[str] | dict[str, Number] | None = None
     free: dict[str, Any] | None = None
     ends: dict[str, tuple[Number, Number, Number]] | None = None
+    gravity: tuple[Gravity, Gravity, Gravity] | None = None
 
 
 _BODY: TypeAdapter[_Body] = TypeAdapter(_Body)
@@ -257,6 +264,7 @@ def _body(node: Node, folder: Path) -> tuple[MujocoBody, str]:
     try:
         hold = given.hold if isinstance(given.hold, dict) else dict.fromkeys(given.hold or (), 0.0)
         body = MujocoBody.load(folder / name, given.base, given.step, given.contacts, hold)
+        body = body if given.gravity is None else body.with_gravity(given.gravity)
         return body.with_ends({link: np.array(place) for link, place in (given.ends or {}).items()}), kind
     except InputError as error:
         raise InputError(f"{node.at(kind).place}: {error}") from None

@@ -4,7 +4,7 @@ E. Todorov, T. Erez, Y. Tassa, MuJoCo: a physics engine for model-based control,
 """
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -50,6 +50,7 @@ class MujocoBody(Body):
     )  # of links that may carry a payload, its place (3,) in their frames
     notes: tuple[str, ...] = ()  # in words, what of the file was left out or changed
     hold: Mapping[str, float] = field(default_factory=dict)  # positions of the file's joints that are held
+    mounted: bool = False  # whether gravity is another one than the file says
 
     @classmethod
     def load(
@@ -110,6 +111,17 @@ class MujocoBody(Body):
             dof, known = self.joints[name].velocity, self.passive[name]
             model.dof_damping[dof], model.dof_frictionloss[dof] = known.damping, known.friction
         return replace(self, model=model)
+
+    @property
+    def gravity(self) -> Array:
+        """Acceleration of gravity (3,) [m/s^2] in the frame of the file's world."""
+        return np.array(self.model.opt.gravity)
+
+    def with_gravity(self, gravity: Sequence[float] | Array) -> "MujocoBody":
+        """A copy with another acceleration of gravity (3,) [m/s^2] in the frame of the file's world, as of a base that hangs or is on a wall."""
+        model = copy.copy(self.model)
+        model.opt.gravity[:] = gravity
+        return replace(self, model=model, mounted=True)
 
     def worker(self) -> tuple[Any, Any]:
         """A model and the data of a run, for one thread."""

@@ -61,7 +61,8 @@ def save_machine(machine: Machine, path: Path) -> tuple[str, ...]:
     if path.suffix == URDF:
         write_text(path, urdf_of(machine, path.parent))
         own = (f"{one}.armature" for one in machine.joints if machine.body.parameters[f"{one}.armature"])
-        return tuple(f"not expressed: {one}" for one in (*own, *_beyond_losses(machine)))
+        mounted = ("body.gravity: a URDF has no place for it",) if machine.body.mounted else ()
+        return tuple(f"not expressed: {one}" for one in (*own, *mounted, *_beyond_losses(machine)))
     machine.save(path)
     return ()
 
@@ -112,6 +113,9 @@ def mjcf_of(machine: Machine, folder: Path) -> str:
     _values(root, machine, step)
     if not machine.body.contacts:
         _section(_section(root, "option"), "flag").set("contact", "disable")
+    if machine.body.mounted:
+        option = _section(root, "option")
+        option.set("gravity", " ".join(repr(float(one)) for one in machine.body.gravity))
     _actuators(root, machine, step)
     _embed(root, machine, step)
     tree.indent(root)
