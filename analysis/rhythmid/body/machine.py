@@ -233,6 +233,7 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
     paths = {name: _path(given[name], name, body, catalogue) for name in order}
     return Machine(body, paths, inertial, kind)
 
+
 Gravity = Annotated[Number, Limits(ge=-MOST_GRAVITY, le=MOST_GRAVITY)]
 
 
