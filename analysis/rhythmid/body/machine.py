@@ -12,6 +12,7 @@ A joint's path is a `Model` whose inertia is the body's: the one that a force al
 and dry friction that the file gives a joint become the elements of that name, where the path has none. `free:` under `body:`
 names inertial parameters that are estimated: `free: {shank.mass: {prior: {mean: 0.4, std: 0.04}}, shank.payload: {}, knee.armature: {}}`.
 A payload sits at the end of its link, for which `ends: {shank: [0, 0, -0.2]}` may give another place [m] in the link's frame.
+`inertials: {shank: {mass: 0.3, centre: [0, 0, -0.1], inertia: [xx, yy, zz, xy, xz, yz]}}` stands for the file's inertia of a link, about the centre.
 `gravity: [9.81, 0, 0]` [m/s^2] under `body:` is for a base that is mounted otherwise than the file says: gravity in the frame of the file's world.
 """
 
@@ -29,7 +30,8 @@ from pydantic import Field as Limits
 
 from rhythmid.body.body import BODY, Array
 from rhythmid.body.inertial_parameter import ARMATURE, PAYLOAD, TURNING, described, split
-from rhythmid.body.mujoco_body import MujocoBody
+from rhythmid.body.link_inertia import about_centre, ten_of
+from rhythmid.body.mujoco_body import HEAVIEST, MujocoBody
 from rhythmid.body.robot_file import FIXED, FREE
 from rhythmid.document import Node, parse, read
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
@@ -151,6 +153,14 @@ class Machine:
             {f"{link}.{PAYLOAD}": mass}
         )
 
+    def with_inertials(self, values: Mapping[str, Array]) -> "Machine":
+        """A copy whose links have these ten numbers (10,), see `MujocoBody.with_inertials`. Raises InputError as that does."""
+        body = self.body.with_inertials(values)
+        paths = {
+            joint: _with_inertia(path, body.effective_inertia(joint)) for joint, path in self.paths.items()
+        }
+        return replace(self, body=body, paths=paths)
+
     def _inertial(self, name: str, value: float) -> Value:
         parameter = described(name)
         units = _units(self.body, name)
@@ -170,6 +180,8 @@ class Machine:
             body["hold"] = dict(self.body.hold)
         if self.body.mounted:
             body["gravity"] = self.body.gravity.tolist()
+        if self.body.replaced:
+            body["inertials"] = {link: _written(ten) for link, ten in self.body.replaced.items()}
         if ends := {link: self.body.ends[link].tolist() for link in self._loaded()}:
             body["ends"] = ends
         if self.inertial:
@@ -234,7 +246,27 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
     return Machine(body, paths, inertial, kind)
 
 
+def _written(ten: Array) -> dict[str, Any]:
+    mass, centre, inertia = about_centre(ten)
+    return {"mass": mass, "centre": centre.tolist(), "inertia": inertia.tolist()}
+
+
 Gravity = Annotated[Number, Limits(ge=-MOST_GRAVITY, le=MOST_GRAVITY)]
+
+
+@dataclass(frozen=True)
+class _Inertial:
+    """Inertia of a link as it is written: mass [kg], its centre [m] in the link's frame, and xx, yy, zz, xy, xz, yz [kg*m^2] about it."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    mass: Annotated[Number, Limits(gt=0.0, le=HEAVIEST)]
+    centre: tuple[Number, Number, Number]
+    inertia: tuple[Number, Number, Number, Number, Number, Number]
+
+    @property
+    def ten(self) -> Array:
+        """The ten numbers (10,)."""
+        return ten_of(self.mass, np.array(self.centre), np.array(self.inertia))
 
 
 @dataclass(frozen=True)
@@ -250,6 +282,7 @@ class _Body:
     hold: list[str] | dict[str, Number] | None = None
     free: dict[str, Any] | None = None
     ends: dict[str, tuple[Number, Number, Number]] | None = None
+    inertials: dict[str, _Inertial] | None = None
     gravity: tuple[Gravity, Gravity, Gravity] | None = None
 
 
@@ -266,6 +299,7 @@ def _body(node: Node, folder: Path) -> tuple[MujocoBody, str]:
         hold = given.hold if isinstance(given.hold, dict) else dict.fromkeys(given.hold or (), 0.0)
         body = MujocoBody.load(folder / name, given.base, given.step, given.contacts, hold)
         body = body if given.gravity is None else body.with_gravity(given.gravity)
+        body = body.with_inertials({link: one.ten for link, one in (given.inertials or {}).items()})
         return body.with_ends({link: np.array(place) for link, place in (given.ends or {}).items()}), kind
     except InputError as error:
         raise InputError(f"{node.at(kind).place}: {error}") from None

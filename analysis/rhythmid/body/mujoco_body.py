@@ -50,6 +50,9 @@ class MujocoBody(Body):
     )  # of links that may carry a payload, its place (3,) in their frames
     notes: tuple[str, ...] = ()  # in words, what of the file was left out or changed
     hold: Mapping[str, float] = field(default_factory=dict)  # positions of the file's joints that are held
+    replaced: Mapping[str, Array] = field(
+        default_factory=dict
+    )  # of links whose inertia is not the file's, the ten numbers (10,) without a payload
     mounted: bool = False  # whether gravity is another one than the file says
 
     @classmethod
@@ -213,6 +216,33 @@ class MujocoBody(Body):
         loads = {f"{link}.{PAYLOAD}": self._payload(link) for link in places}
         bare = self.with_parameters(dict.fromkeys(loads, 0.0))
         return replace(bare, ends={**self.ends, **places}).with_parameters(loads)
+
+    def with_inertials(self, values: Mapping[str, Array]) -> "MujocoBody":
+        """A copy whose links have these ten numbers (10,), see `inertial_columns`, besides their payloads.
+
+        Raises InputError for an unknown link, and for numbers that are those of no rigid body.
+        """
+        mj, model = mujoco(), copy.copy(self.model)
+        for link, ten in values.items():
+            if link not in self.links:
+                raise InputError(
+                    f"{self.path}: has no link {link!r} that moves; those are {', '.join(self.links)}"
+                )
+            own = Principal.from_ten(ten) if ten[0] > 0.0 else None
+            if own is None or not own.possible:
+                raise InputError(
+                    f"{self.path}: the inertia given for the link {link!r} is that of no rigid body"
+                )
+            if payload := self._payload(link):
+                own = Principal.from_ten(ten + payload * point_mass(self.ends[link]))
+            own.put_into(model, self.links[link])
+        mj.mj_setConst(model, quiet_data(model))
+        given = {
+            name: value
+            for name, value in self.given.items()
+            if name not in {f"{one}.{TURNING}" for one in values}
+        }
+        return replace(self, model=model, given=given, replaced={**self.replaced, **values})
 
     def _payload(self, link: str) -> float:
         return self.given.get(f"{link}.{PAYLOAD}", 0.0)
