@@ -11,6 +11,7 @@ import pytest
 from rhythmid.body.machine import Machine, describes_machine
 from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.body.simulate import means, run_steps, simulate
+from rhythmid.body.write_back import save_machine
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
@@ -117,6 +118,23 @@ def test_a_machine_is_read_back_as_it_was_written(tmp_path: Path):
     assert describes_machine(LEG) and not describes_machine(MODELS / "paper_hopper.yaml")
 
 
+def test_a_base_on_a_wall_feels_gravity_along_another_axis_in_balance_run_and_file(tmp_path: Path):
+    usual = Machine.load(LEG)
+    text = usual.to_yaml(tmp_path).replace("contacts:", "gravity: [9.81, 0, -1], contacts:", 1)
+    (tmp_path / "wall.yaml").write_text(text)
+    machine = Machine.load(tmp_path / "wall.yaml")
+    assert Machine.from_text(machine.to_yaml(tmp_path), tmp_path, load_catalogue()).body.gravity.tolist() == [9.81, 0.0, -1.0]  # fmt: skip
+    heavier = machine.with_inertial({"shank.mass": 0.5}).body  # a copy keeps it
+    assert heavier.gravity.tolist() == [9.81, 0.0, -1.0] and usual.body.gravity[2] == pytest.approx(-9.81)
+    rest = np.zeros((1, 3))
+    assert not np.allclose(machine.body.inverse(rest, rest, rest), usual.body.inverse(rest, rest, rest))
+    time = np.arange(50) * 0.002
+    assert not np.allclose(simulate(machine, time, {}).pose[-1], simulate(usual, time, {}).pose[-1])
+    save_machine(machine, tmp_path / "wall.xml")
+    written_back = mujoco.MjModel.from_xml_path(str(tmp_path / "wall.xml"))
+    assert written_back.opt.gravity.tolist() == [9.81, 0.0, -1.0]
+
+
 def test_losses_that_the_bodys_file_gives_a_joint_become_elements(tmp_path: Path):
     xml = (MODELS / "legs" / "leg.xml").read_text()
     (tmp_path / "lossy.xml").write_text(
@@ -141,6 +159,8 @@ def test_losses_that_the_bodys_file_gives_a_joint_become_elements(tmp_path: Path
         ("body: {mjcf: leg.xml, base: rail}\njoints: {rail: {}}", "joint of the base"),
         ("body: {mjcf: leg.xml, free: {tail.mass: {}}}\njoints: {knee: {}}", "no such parameter"),
         ("body: {mjcf: leg.xml, free: {shank.mass: 0}}\njoints: {knee: {}}", "a mapping"),
+        ("body: {mjcf: leg.xml, gravity: [9.81, 0]}\njoints: {knee: {}}", "gravity"),
+        ("body: {mjcf: leg.xml, gravity: [9810, 0, 0]}\njoints: {knee: {}}", "too large"),
         ("body: {mjcf: leg.xml, step: 1}\njoints: {knee: {}}", "too large"),
         ("body: {mjcf: leg.xml}\njoints: {knee: {force: [{frictions: {}}]}}", "unknown element"),
     ],

@@ -22,11 +22,15 @@ LEG = {"hip": (0.6, 0.3), "knee": (-1.2, 0.3)}
 
 
 def played(
-    machine: Machine, asked: dict[str, tuple[float, float]], seconds: float, effort: bool = True
+    machine: Machine,
+    asked: dict[str, tuple[float, float]],
+    seconds: float,
+    effort: bool = True,
+    band: tuple[float, float] = (0.5, 4.0),
 ) -> JointRecord:
     rng = np.random.default_rng(7)
     time = np.arange(0.0, seconds, 0.002)
-    return recorded(machine, references(asked, time, rng, (0.5, 4.0)), time, rng, with_effort=effort)
+    return recorded(machine, references(asked, time, rng, band), time, rng, with_effort=effort)
 
 
 def exchanged(record: JointRecord, **names: str) -> JointRecord:
@@ -185,6 +189,50 @@ def test_identify_diagnose_and_check_tell_the_mend_and_the_mended_signals_are_ta
     (tmp_path / "signals.yaml").write_text(text.replace("unit: rad}", "unit: rad, scale: {ankle: -1}}"))
     with pytest.raises(InputError, match="scale.ankle: is no joint; those are hip, knee"):
         load_joint_records([tmp_path / "run.csv"], tmp_path / "signals.yaml")
+
+
+def unlike(machine: Machine) -> Machine:
+    """The machine with heavier links, and with dry friction that is more than the weight at joints that hardly carry any."""
+    plant = machine.with_inertial({name: 1.4 * value for name, value in machine.body.parameters.items() if name.endswith(".mass")})  # fmt: skip
+    for joint in machine.joints:
+        plant = plant.with_element(
+            joint, load_catalogue()["coulomb_friction"], {"force": 2.0, "transition": 0.05}
+        )
+    return plant
+
+
+def test_all_efforts_with_their_sign_turned_are_told_though_some_joints_move_by_friction_alone():
+    machine, _ = arm()
+    asked = {joint: (float(machine.body.reference[k]), 0.3) for k, joint in enumerate(machine.joints)}
+    record = played(unlike(machine), asked, 3.0)
+    assert likely_joint_mend(machine, [record]) is None
+    found = likely_joint_mend(machine, [scaled(record, *machine.joints, effort=-1.0)])
+    assert found is not None and "effort of every joint seems to have its sign turned round" in found
+
+
+def test_a_base_on_a_wall_and_efforts_without_weight_are_told_with_the_vector_to_write(leg):
+    machine, _ = leg
+
+    def said(truth: list[float], file: list[float]) -> str | None:
+        plant, known = (replace(machine, body=machine.body.with_gravity(one)) for one in (truth, file))
+        return likely_joint_mend(known, [played(plant, LEG, 4.0, band=(0.2, 1.0))])
+
+    down, wall, none = [0.0, 0.0, -9.81], [9.81, 0.0, 0.0], [0.0, 0.0, 0.0]
+    found = said(truth=wall, file=down)
+    assert found is not None and "mounted otherwise" in found and "\n" not in found
+    assert "write  gravity: [9.81, 0, 0]  under 'body:' in the model's file" in found
+    assert said(truth=wall, file=wall) is None
+    found = said(truth=down, file=wall)
+    assert found is not None and "gravity: [0, 0, -9.81]" in found
+    found = said(truth=none, file=down)
+    assert found is not None and "without the weight of the links" in found and "gravity: [0, 0, 0]" in found
+
+
+def test_unit_and_sign_joint_by_joint_are_one_line_with_one_scale(leg):
+    machine, record = leg
+    found = likely_joint_mend(machine, [scaled(scaled(record, "hip", effort=0.05), "knee", effort=-0.1)])
+    assert found is not None and found.count("scale:") == 1
+    assert "scale: {hip: 2" in found and "knee: -" in found
 
 
 def test_efforts_that_no_reading_explains_are_not_mended(leg):

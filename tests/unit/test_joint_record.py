@@ -89,3 +89,19 @@ def test_what_is_wrong_in_the_signals_is_told_in_one_line(tmp_path: Path, text: 
     with pytest.raises(InputError, match=said) as caught:
         load_joint_records([bag], tmp_path / "signals.yaml")
     assert "\n" not in str(caught.value)
+
+
+def test_a_scale_by_joint_goes_by_the_models_names_where_the_recording_has_others(tmp_path: Path):
+    header = "t,q_0,q_1,i_0,i_1"
+    rows = np.column_stack([TIME, MOTION[:, :2], MOTION[:, :2]])
+    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header=header, comments="")
+    (tmp_path / "signals.yaml").write_text(
+        'joints: {hip: "0", knee: "1"}\ntime: {column: t}\noutput: {column: "q_*", scale: {hip: -1}}\n'
+        'effort: {column: "i_*", scale: {knee: 7.5}}\n'
+    )
+    (found,) = load_joint_records([tmp_path / "run.csv"], tmp_path / "signals.yaml")
+    for joint, column, position, effort in (("hip", 0, -1.0, 1.0), ("knee", 1, 1.0, 7.5)):
+        one = found.joints[joint]
+        assert one.effort is not None
+        np.testing.assert_allclose(one.output.value, position * MOTION[:, column])
+        np.testing.assert_allclose(one.effort.value, effort * MOTION[:, column])

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from answers import diagnosed
 
+from rhythmid.diagnose.answer.result import FitQuality
 from rhythmid.diagnose.joints.joint_answer import JointEffect
 from rhythmid.diagnose.joints.joint_compose import summary_of_joints
 
@@ -27,3 +28,21 @@ def test_an_effect_that_others_replace_is_told_with_them_and_a_certain_one_alone
     )
     sure = replace(effect, probability=0.9)
     assert summary_of_joints([sure], (), (), answers) == "The model is wrong at knee: constant force."
+
+
+def test_a_name_of_low_probability_is_in_doubt_and_no_headline():
+    effect = JointEffect("knee", "link_mass", "body", "m → m′", 0.9, 0.3, {}, 0.2, "shank")
+    sure = JointEffect("hip", "coulomb_friction", "force", "F", 0.9, 0.95, {}, 0.2)
+    answers = {"hip": diagnosed("missing_physics", "coulomb_friction"), "knee": diagnosed("undecided")}
+    assert summary_of_joints([sure, effect], (), (), answers) == (
+        "The model is wrong at hip: Coulomb friction. In doubt: knee: the mass of shank (probability 0.30)."
+    )
+
+
+def test_what_leaves_most_of_an_undecided_joints_effort_is_in_doubt_however_probable():
+    far = {"refitted_nominal": FitQuality(0.9, 0.89), "augmented": FitQuality(0.5, 0.46)}
+    effect = JointEffect("knee", "coulomb_friction", "force", "F", 0.4, 0.9, {}, 0.2)
+    answers = {"knee": replace(diagnosed("undecided"), fit=far)}
+    assert summary_of_joints([effect], (), (), answers) == (
+        "In doubt: knee: Coulomb friction (probability 0.90)."
+    )

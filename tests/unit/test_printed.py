@@ -191,6 +191,11 @@ def test_what_is_left_at_a_joint_is_a_plain_share_and_nothing_where_nothing_is_m
     assert left_words(replace(ANSWER, verdict=verdict, remainder=left)) == words
 
 
+def test_an_error_of_the_size_of_the_effort_is_not_called_noise():
+    fit = {**ANSWER.fit, "augmented": FitQuality(1.3, 1.32)}
+    assert left_words(replace(ANSWER, verdict="undecided", remainder=Remainder(0.0, False, None, None), fit=fit)) == "not explained"  # fmt: skip
+
+
 def test_of_an_undecided_answer_the_families_are_told_with_their_probability():
     family = MissingFamily("friction", ("coulomb_friction", "stribeck_friction"), 0.9, 0.93)
     told = printed(replace(ANSWER, verdict="undecided", families=(family,)))

@@ -13,6 +13,7 @@ from rhythmid.body.machine import Machine
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.record.joint_record import load_joint_records
+from rhythmid.start.families import joints_of
 from rhythmid.start.robot import RobotStart, start_robot
 from rhythmid.units import ROTATIONAL
 
@@ -96,6 +97,40 @@ def test_joints_are_told_by_their_names_or_else_by_their_numbers(tmp_path, robot
     found = begun(table(tmp_path / "run.csv", run, [*heads, *efforts], "position", "effort"), robot)
     assert joints in found.signals
     assert any("they are numbered" in line for line in found.lines()) == ("1" in joints)
+
+
+def test_joints_with_another_beginning_or_numbering_than_the_files_are_matched_with_a_check(
+    tmp_path, robot, run
+):
+    def states(*names: str) -> Path:
+        rows = zip(NOW + run["time"][:500], run["position"][:500], run["effort"][:500], strict=True)
+        messages = [(at, joint_state(at, list(names), position=list(q), effort=list(f))) for at, q, f in rows]
+        return foreign.write(tmp_path / "_".join(names), {"/joint_states": messages})
+
+    found = begun(states("left_elbow", "left_shoulder"), robot)
+    assert 'joints: {shoulder_joint: "left_shoulder", elbow_joint: "left_elbow"}' in found.signals
+    assert any("other names than the robot's file" in line for line in found.doubts)
+    panda, fer = ([f"{name}_joint{k}" for k in (1, 2)] for name in ("panda", "fer"))
+    finger = "panda_finger_joint1"
+    assert joints_of([*panda, finger], fer, told=True) == dict(zip(panda, fer, strict=True))
+    assert joints_of(["pan", "lift"], ["axis_2", "axis_1"], told=True) == {"pan": "axis_1", "lift": "axis_2"}
+    assert joints_of(["pan", "lift"], ["wheel", "steer"], told=True) == {}
+    assert joints_of(["hip", "knee"], ["other_hip", "other_ankle"], told=True) == {}
+
+
+def test_a_current_gets_a_check_of_its_unit(tmp_path, robot, run):
+    for heads, doubted in ((["i1", "i2"], True), (["tau1", "tau2"], False), (["i1 [Nm]", "i2 [Nm]"], False)):
+        found = begun(table(tmp_path / "run.csv", run, ["q1", "q2", *heads], "position", "effort"), robot)
+        assert any("is called a current" in line for line in found.doubts) == doubted
+        assert ("# CHECK effort: i* is called a current" in found.signals) == doubted
+
+
+def test_efforts_with_other_numbers_than_the_positions_are_refused_with_how_to_go_on(tmp_path, robot, run):
+    path = table(tmp_path / "run.csv", run, ["q0", "q1", "tau1", "tau2"], "position", "effort")
+    with pytest.raises(
+        InputError, match=r"q\* is numbered from 0, tau\* from 1; give the columns of one joint one number"
+    ):
+        begun(path, robot)
 
 
 def test_units_of_headings_are_heeded(tmp_path, robot, run):

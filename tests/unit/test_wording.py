@@ -12,6 +12,7 @@ from rhythmid.diagnose.hypothesis import Hypothesis
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.identify import paper_hopper
 from rhythmid.model import Model
+from rhythmid.report.quantity import in_words
 
 
 def named_beside(count: int, groups: tuple[tuple[str, ...], ...] = ()) -> str:
@@ -94,3 +95,10 @@ def test_a_pure_number_is_told_without_a_unit(unit, told):
         f"inertia: {{mass: {{value: 2.0, unit: '{unit}', fixed: true}}}}\nforce: [viscous_damper: {{damping: {{value: 1.0}}}}]"
     )
     assert told in freed_value(model, model, freed("inertia.mass"))
+
+
+def test_a_value_of_a_body_keeps_the_files_name_of_its_link():
+    assert in_words("body.wrist_2_link.mass") == "the mass of wrist_2_link"
+    assert (
+        in_words("coulomb_friction, body.left.arm_1.inertia") == "Coulomb friction, the inertia of left.arm_1"
+    )

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from rhythmid.body.robot_file import mujoco, quiet_data
 
 Array = NDArray[np.float64]
+WRITTEN = 1e-3  # share by which a moment may be impossible through the rounding of numbers with four digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +54,12 @@ class Principal:
         axes = Rotation.from_quat(np.roll(self.turn, -1)).as_matrix()
         about = axes @ np.diag(self.moments) @ axes.T + _of_point(self.mass, self.centre)
         return _joined(self.mass, self.centre, about)
+
+    @property
+    def possible(self) -> bool:
+        """Whether a rigid body has these moments: none is negative or greater than the sum of the others, but for the rounding of written numbers."""
+        low, middle, high = sorted(self.moments)
+        return bool(self.mass > 0.0 and low >= -WRITTEN * high and high <= (low + middle) * (1.0 + WRITTEN))
 
     def about(self, axis: Array) -> float:
         """Moment of inertia about an axis (3,) of unit length through the centre."""
@@ -100,6 +107,19 @@ def hinges(model: Any, links: Mapping[str, int]) -> dict[str, Hinge]:
                     found[name] = Hinge(place, axes.T @ data.xaxis[joint])
             number = int(model.body_parentid[number])
     return found
+
+
+def ten_of(mass: float, centre: Array, about: Array) -> Array:
+    """The ten numbers (10,) of a mass at a centre (3,) and the inertia about it, along the frame's axes (6,): xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = about
+    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return _joined(mass, centre, own + _of_point(mass, centre))
+
+
+def about_centre(ten: Array) -> tuple[float, Array, Array]:
+    """Mass, centre (3,) and inertia about it (6,) of the ten numbers (10,): the reverse of `ten_of`."""
+    mass, centre = float(ten[0]), ten[1:4] / ten[0]
+    return mass, centre, ten[4:] - point_mass(centre)[4:] * mass
 
 
 def point_mass(place: Array) -> Array:

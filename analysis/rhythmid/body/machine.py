@@ -13,6 +13,8 @@ Damping and dry friction of a joint in the file become the elements of that name
 under `body:` names the inertial parameters to estimate: `free: {shank.mass: {prior: {mean: 0.4, std: 0.04}},
 shank.payload: {}, knee.armature: {}}`. A payload is at the end of its link; `ends: {shank: [0, 0, -0.2]}` gives
 another position [m] in the link's frame.
+`inertials: {shank: {mass: 0.3, centre: [0, 0, -0.1], inertia: [xx, yy, zz, xy, xz, yz]}}` replaces the inertia of a link in the file, about the centre of mass.
+`gravity: [9.81, 0, 0]` [m/s^2] under `body:` is gravity in the world frame of the file, for a base that is mounted otherwise than the file says.
 """
 
 import os
@@ -29,7 +31,8 @@ from pydantic import Field as Limits
 
 from rhythmid.body.body import BODY, Array
 from rhythmid.body.inertial_parameter import ARMATURE, PAYLOAD, TURNING, described, split
-from rhythmid.body.mujoco_body import MujocoBody
+from rhythmid.body.link_inertia import about_centre, ten_of
+from rhythmid.body.mujoco_body import HEAVIEST, MujocoBody
 from rhythmid.body.robot_file import FIXED, FREE
 from rhythmid.document import Node, parse, read
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
@@ -43,6 +46,7 @@ from rhythmid.value import Value, entry_of, value_of
 
 KINDS = ("mjcf", "urdf")
 LONGEST_STEP = 0.01  # [s] largest integration step: ten times the largest step for stable contacts
+MOST_GRAVITY = 100.0  # [m/s^2] of a component: four times that of Jupiter (NASA, planetary fact sheet); more is another unit
 # [rad/s or m/s] transition speed for the dry friction of a body's file, which is a jump in MuJoCo
 TRANSITION = 0.01
 
@@ -151,6 +155,14 @@ class Machine:
             {f"{link}.{PAYLOAD}": mass}
         )
 
+    def with_inertials(self, values: Mapping[str, Array]) -> "Machine":
+        """A copy whose links have these ten numbers (10,), see `MujocoBody.with_inertials`. Raises InputError as that does."""
+        body = self.body.with_inertials(values)
+        paths = {
+            joint: _with_inertia(path, body.effective_inertia(joint)) for joint, path in self.paths.items()
+        }
+        return replace(self, body=body, paths=paths)
+
     def _inertial(self, name: str, value: float) -> Value:
         parameter = described(name)
         units = _units(self.body, name)
@@ -168,6 +180,10 @@ class Machine:
         body |= {"step": self.body.step, "contacts": self.body.contacts}
         if self.body.hold:
             body["hold"] = dict(self.body.hold)
+        if self.body.mounted:
+            body["gravity"] = self.body.gravity.tolist()
+        if self.body.replaced:
+            body["inertials"] = {link: _written(ten) for link, ten in self.body.replaced.items()}
         if ends := {link: self.body.ends[link].tolist() for link in self._loaded()}:
             body["ends"] = ends
         if self.inertial:
@@ -232,6 +248,29 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
     return Machine(body, paths, inertial, kind)
 
 
+def _written(ten: Array) -> dict[str, Any]:
+    mass, centre, inertia = about_centre(ten)
+    return {"mass": mass, "centre": centre.tolist(), "inertia": inertia.tolist()}
+
+
+Gravity = Annotated[Number, Limits(ge=-MOST_GRAVITY, le=MOST_GRAVITY)]
+
+
+@dataclass(frozen=True)
+class _Inertial:
+    """Inertia of a link as it is written: mass [kg], its centre [m] in the link's frame, and xx, yy, zz, xy, xz, yz [kg*m^2] about it."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    mass: Annotated[Number, Limits(gt=0.0, le=HEAVIEST)]
+    centre: tuple[Number, Number, Number]
+    inertia: tuple[Number, Number, Number, Number, Number, Number]
+
+    @property
+    def ten(self) -> Array:
+        """The ten numbers (10,)."""
+        return ten_of(self.mass, np.array(self.centre), np.array(self.inertia))
+
+
 @dataclass(frozen=True)
 class _Body:
     """A body as written in the file."""
@@ -245,6 +284,8 @@ class _Body:
     hold: list[str] | dict[str, Number] | None = None
     free: dict[str, Any] | None = None
     ends: dict[str, tuple[Number, Number, Number]] | None = None
+    inertials: dict[str, _Inertial] | None = None
+    gravity: tuple[Gravity, Gravity, Gravity] | None = None
 
 
 _BODY: TypeAdapter[_Body] = TypeAdapter(_Body)
@@ -259,6 +300,8 @@ def _body(node: Node, folder: Path) -> tuple[MujocoBody, str]:
     try:
         hold = given.hold if isinstance(given.hold, dict) else dict.fromkeys(given.hold or (), 0.0)
         body = MujocoBody.load(folder / name, given.base, given.step, given.contacts, hold)
+        body = body if given.gravity is None else body.with_gravity(given.gravity)
+        body = body.with_inertials({link: one.ten for link, one in (given.inertials or {}).items()})
         return body.with_ends({link: np.array(place) for link, place in (given.ends or {}).items()}), kind
     except InputError as error:
         raise InputError(f"{node.at(kind).place}: {error}") from None

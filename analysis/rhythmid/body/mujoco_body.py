@@ -4,7 +4,7 @@ E. Todorov, T. Erez, Y. Tassa, MuJoCo: a physics engine for model-based control,
 """
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -50,6 +50,10 @@ class MujocoBody(Body):
     )  # for links that may carry a payload, its position (3,) in their frames
     notes: tuple[str, ...] = ()  # parts of the file that were left out or changed, in words
     hold: Mapping[str, float] = field(default_factory=dict)  # positions of the file's joints that are fixed
+    replaced: Mapping[str, Array] = field(
+        default_factory=dict
+    )  # for links whose inertia is not the file's, the ten numbers (10,) without a payload
+    mounted: bool = False  # whether gravity differs from the file's
 
     @classmethod
     def load(
@@ -112,6 +116,17 @@ class MujocoBody(Body):
             dof, known = self.joints[name].velocity, self.passive[name]
             model.dof_damping[dof], model.dof_frictionloss[dof] = known.damping, known.friction
         return replace(self, model=model)
+
+    @property
+    def gravity(self) -> Array:
+        """Acceleration of gravity (3,) [m/s^2] in the frame of the file's world."""
+        return np.array(self.model.opt.gravity)
+
+    def with_gravity(self, gravity: Sequence[float] | Array) -> "MujocoBody":
+        """A copy with another acceleration of gravity (3,) [m/s^2] in the frame of the file's world, as of a base that hangs or is on a wall."""
+        model = copy.copy(self.model)
+        model.opt.gravity[:] = gravity
+        return replace(self, model=model, mounted=True)
 
     def worker(self) -> tuple[Any, Any]:
         """A model and the data of a run, for use in one thread."""
@@ -204,6 +219,33 @@ class MujocoBody(Body):
         loads = {f"{link}.{PAYLOAD}": self._payload(link) for link in places}
         bare = self.with_parameters(dict.fromkeys(loads, 0.0))
         return replace(bare, ends={**self.ends, **places}).with_parameters(loads)
+
+    def with_inertials(self, values: Mapping[str, Array]) -> "MujocoBody":
+        """A copy whose links have these ten numbers (10,), see `inertial_columns`, besides their payloads.
+
+        Raises InputError for an unknown link, and for numbers that are those of no rigid body.
+        """
+        mj, model = mujoco(), copy.copy(self.model)
+        for link, ten in values.items():
+            if link not in self.links:
+                raise InputError(
+                    f"{self.path}: has no link {link!r} that moves; those are {', '.join(self.links)}"
+                )
+            own = Principal.from_ten(ten) if ten[0] > 0.0 else None
+            if own is None or not own.possible:
+                raise InputError(
+                    f"{self.path}: the inertia given for the link {link!r} is that of no rigid body"
+                )
+            if payload := self._payload(link):
+                own = Principal.from_ten(ten + payload * point_mass(self.ends[link]))
+            own.put_into(model, self.links[link])
+        mj.mj_setConst(model, quiet_data(model))
+        given = {
+            name: value
+            for name, value in self.given.items()
+            if name not in {f"{one}.{TURNING}" for one in values}
+        }
+        return replace(self, model=model, given=given, replaced={**self.replaced, **values})
 
     def _payload(self, link: str) -> float:
         return self.given.get(f"{link}.{PAYLOAD}", 0.0)

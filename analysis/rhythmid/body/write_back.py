@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from rhythmid.body.embedded import NAME, text_of
 from rhythmid.body.inertial_parameter import MASS, PAYLOAD
+from rhythmid.body.link_inertia import Principal, about_centre
 from rhythmid.body.live_source import generate_live, numbers_of, rows_of
 from rhythmid.body.machine import Machine
 from rhythmid.body.mujoco_body import MujocoBody
@@ -64,7 +65,8 @@ def save_machine(machine: Machine, path: Path) -> tuple[str, ...]:
     if path.suffix == URDF:
         write_text(path, urdf_of(machine, path.parent))
         own = (f"{one}.armature" for one in machine.joints if machine.body.parameters[f"{one}.armature"])
-        return tuple(f"not expressed: {one}" for one in (*own, *_beyond_losses(machine)))
+        mounted = ("body.gravity: a URDF has no place for it",) if machine.body.mounted else ()
+        return tuple(f"not expressed: {one}" for one in (*own, *mounted, *_beyond_losses(machine)))
     machine.save(path)
     return ()
 
@@ -115,6 +117,9 @@ def mjcf_of(machine: Machine, folder: Path) -> str:
     _values(root, machine, step)
     if not machine.body.contacts:
         _section(_section(root, "option"), "flag").set("contact", "disable")
+    if machine.body.mounted:
+        option = _section(root, "option")
+        option.set("gravity", " ".join(repr(float(one)) for one in machine.body.gravity))
     _actuators(root, machine, step)
     _embed(root, machine, step)
     tree.indent(root)
@@ -222,6 +227,22 @@ def _scale(link: tree.Element, share: float) -> None:
             inertia.set(key, repr(share * float(value)))
 
 
+def _replace(link: tree.Element, own: Principal | None) -> None:
+    """Give a link of a URDF this inertia, or none: what is fixed to a link has its part in the inertia of that."""
+    for known in link.findall("inertial"):
+        link.remove(known)
+    if own is None:
+        return
+    inertial = tree.SubElement(link, "inertial")
+    mass, centre, about = about_centre(own.ten)
+    tree.SubElement(inertial, "origin", xyz=" ".join(repr(float(one)) for one in centre), rpy="0 0 0")
+    tree.SubElement(inertial, "mass", value=repr(mass))
+    words = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    tree.SubElement(
+        inertial, "inertia", {word: repr(float(one)) for word, one in zip(words, about, strict=True)}
+    )
+
+
 def _add_inertia(link: tree.Element, ten: Array) -> None:
     """Add the moments of inertia in ten parameters (10,) to a link of a URDF, which includes the inertia of
     everything fixed to it."""
@@ -270,10 +291,14 @@ def urdf_of(machine: Machine, folder: Path) -> str:
     given = MujocoBody.load(body.path, contacts=False, hold=body.hold)
     fixed = _fixed_to(document.getroot(), body.hold)
     for link in document.iter("link"):
-        name = f"{_carrier(str(link.get('name')), fixed, machine.body.links)}.{MASS}"
-        if name in known:
+        carrier = _carrier(str(link.get("name")), fixed, machine.body.links)
+        name = f"{carrier}.{MASS}"
+        if carrier in body.replaced:
+            _replace(link, body.own(carrier) if link.get("name") == carrier else None)
+        elif name in known:
             _scale(link, known[name] / given.parameters[name])
-    for link in (one for one in document.iter("link") if one.get("name") in body.links):
+    own = [one for one in document.iter("link") if one.get("name") in body.links]
+    for link in (one for one in own if one.get("name") not in body.replaced):
         more = _beyond_mass(body, given, str(link.get("name")))
         if np.abs(more).max() > ROUNDING * np.abs(given.inertial(str(link.get("name")))).max():
             _add_inertia(link, more)

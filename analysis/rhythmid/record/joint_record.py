@@ -164,7 +164,7 @@ def _joint_signals(document: Node, path: Path) -> JointSignals:
         _check_scale(keys.get(role), names)
     whole = replace(document, value=keys)
     found = {
-        joint: Signals.from_node(_for_joint(whole, own, place), path)
+        joint: Signals.from_node(_for_joint(whole, joint, own, place), path)
         for place, (joint, own) in enumerate(names.items())
     }
     of_base = None
@@ -206,17 +206,19 @@ def _check_scale(channel: Node | None, names: Iterable[str]) -> None:
                 one.fail(f"is no joint; those are {', '.join(names)}")
 
 
-def _for_joint(node: Node, joint: str, place: int) -> Node:
-    """The document with the joint inserted for every star."""
+def _for_joint(node: Node, joint: str, own: str, place: int) -> Node:
+    """The document with `own`, the joint's name in the recording, inserted for every star, and with the values that are given for `joint`
+    by its name in the model."""
     if isinstance(node.value, dict) and node.path.endswith("scale"):
-        own = node.value.get(joint)
-        return replace(node, value=1.0) if own is None else own
+        said = node.value.get(joint)
+        return replace(node, value=1.0) if said is None else said
     if isinstance(node.value, dict):
-        return replace(node, value={key: _for_joint(one, joint, place) for key, one in node.value.items()})
+        made = {key: _for_joint(one, joint, own, place) for key, one in node.value.items()}
+        return replace(node, value=made)
     if isinstance(node.value, list):
-        return replace(node, value=[_for_joint(one, joint, place) for one in node.value])
+        return replace(node, value=[_for_joint(one, joint, own, place) for one in node.value])
     if not isinstance(node.value, str) or "*" not in node.value:
         return node
     column = node.path.endswith("column")
-    text = node.value.replace("[*]", f"[{place}]" if column else f"[{joint}]")
-    return replace(node, value=text.replace("*", joint))
+    text = node.value.replace("[*]", f"[{place}]" if column else f"[{own}]")
+    return replace(node, value=text.replace("*", own))

@@ -226,6 +226,6 @@ def put_in_order(time: Times, label: str, mend: str) -> NDArray[np.int64]:
         first = late[0]
         raise InputError(
             f"{label}: time goes backwards by {newest[first] - time[first]:.6g} s at {newest[first]:.6f} s "
-            f"(sample {first} of {len(time)}): the clock was set back; {mend}"
+            f"(sample {first} of {len(time)}): the clock was set back, or that row is damaged; {mend}"
         )
     return kept

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.diagnose.joints.misfit import left_in_words
 from rhythmid.report.blocks import (
     Block,
     Bullets,
@@ -101,8 +102,8 @@ def _table(result: Mapping[str, Any]) -> Table:
         missing = [pretty_name(m["element"]) for m in result["missing"] if m["joint"] == joint]
         errors = [one["fit"][name]["heldout_nrmse"] for name in ("refitted_nominal", "augmented")]
         rest = one["remainder"]
-        left = f"{100.0 * rest['share']:.0f}\u202f% of the mismatch" if rest["significant"] else "noise"
-        left = NONE if one["verdict"] == "consistent" else left
+        left = left_in_words(one["verdict"], rest["share"], rest["significant"], errors[1])
+        left = left.replace(" %", "\u202f%")
         shown = [NONE if error is None else percent(error) for error in errors]
         rows.append((joint, one["verdict"].replace("_", " "), ", ".join(missing) or NONE, *shown, left))
         if one["verdict"] != "consistent":

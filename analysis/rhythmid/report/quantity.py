@@ -30,8 +30,22 @@ def pretty_unit(unit: str) -> str:
     return unit.replace("*", "·")
 
 
+_OF_BODY = re.compile(r"\bbody\.([^\s,;]+?)\.(mass|inertia|payload|armature)\b")
+
+
 def in_words(names: str) -> str:
-    """Names of elements in words, surnames with capitals: "coulomb_friction" is "Coulomb friction"."""
+    """Names of elements in words, surnames with capitals: "coulomb_friction" is "Coulomb friction".
+
+    A body's value keeps the name that its file has for the link: "body.wrist_2_link.mass" is "the mass of wrist_2_link".
+    """
+    parts = _OF_BODY.split(names)
+    said = [_spelt(parts[0])]
+    for link, kind, rest in zip(parts[1::3], parts[2::3], parts[3::3], strict=True):
+        said += [f"the {kind} of {link}", _spelt(rest)]
+    return "".join(said)
+
+
+def _spelt(names: str) -> str:
     words = names.replace("_", " ")
     for plain, spelt in _SPELT.items():
         words = re.sub(rf"\b{plain}\b", spelt, words)

@@ -14,6 +14,10 @@ from rhythmid.start.meaning import Quantity, meaning_of, words_of
 
 GENERIC = frozenset({"joint"})  # words that a robot's file and its recordings add to joint names arbitrarily
 
+FEWEST_MATCHED = (
+    2  # joints by which names with another beginning are matched: one alone has nothing to be told from
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Family:
@@ -107,4 +111,34 @@ def joints_of(own: Sequence[str], recorded: Sequence[str], told: bool) -> dict[s
         joint: joint if joint in recorded else known.get(frozenset(words_of(joint)) - GENERIC)
         for joint in own
     }
-    return {joint: name for joint, name in found.items() if name is not None}
+    return {joint: name for joint, name in found.items() if name is not None} or _by_what_differs(
+        own, recorded
+    )
+
+
+def _by_what_differs(own: Sequence[str], recorded: Sequence[str]) -> dict[str, str]:
+    """Joints matched by what tells them apart from their neighbours: `fer_joint1` is `panda_joint1`; numbers alone go by the file's order.
+
+    Empty where a joint of the recording is left over or would be two of the robot's.
+    """
+    theirs = _distinct(recorded)
+    mine = _distinct(own)
+    if len(recorded) < FEWEST_MATCHED or len(set(theirs.values())) < len(recorded):
+        return {}
+    found = {joint: name for joint, rest in mine.items() for name, known in theirs.items() if rest == known}
+    if len(set(found.values())) == len(found) == len(recorded):
+        return found
+    numbers = [min(rest) if len(rest) == 1 else "" for rest in theirs.values()]
+    if len(recorded) == len(own) and all(one.isdigit() for one in numbers):
+        order = sorted(theirs, key=lambda name: int(min(theirs[name])))
+        return dict(zip(own, order, strict=True))
+    return {}
+
+
+def _distinct(names: Sequence[str]) -> dict[str, frozenset[str]]:
+    """The words of each name, its number apart, without those with which all names begin."""
+    split = {name: [one for word in words_of(name) for one in re.findall(r"\d+|\D+", word)] for name in names}
+    same = 0
+    while len({words[same] if same < len(words) else "" for words in split.values()}) == 1 and same < min(map(len, split.values())):  # fmt: skip
+        same += 1
+    return {name: frozenset(words[same:]) - GENERIC for name, words in split.items()}

@@ -21,10 +21,13 @@ from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, header_clock, inventory
 from rhythmid.record.joint_record import JointSignals, load_joint_records
 from rhythmid.start.drivers import not_read
-from rhythmid.start.families import Family, families_of, joints_of
-from rhythmid.start.meaning import Quantity, meaning_of, says_it_was_read
+from rhythmid.start.families import GENERIC, Family, families_of, joints_of
+from rhythmid.start.meaning import Quantity, meaning_of, says_it_was_read, words_of
 from rhythmid.start.written import GUESSED, as_guessed, comment, time_of
 
+CURRENTS = frozenset(
+    {"i", "iq", "current", "currents", "amp", "amps", "ampere", "amperes"}
+)  # words that name a current, not a force
 LITTLE = 0.02  # share of the effort assigned to viscous damping as a first guess
 # first guess for a controller with unknown gains: this frequency [Hz] and damping ratio with the inertia of the joint
 STIFF, DAMPED = 3.0, 0.7
@@ -82,7 +85,7 @@ def start_robot(
     if effort is None and reference is None:
         raise InputError(
             f"{found.path}: neither efforts nor references of {', '.join(output.members)} are among "
-            f"{', '.join(one.pattern for one in families)}"
+            f"{', '.join(one.pattern for one in families)}{_other_numbers(families, output)}"
         )
     told = [_line("output", output, found.is_bag, joints)]
     told += [
@@ -150,6 +153,23 @@ def _effort(families: Sequence[Family], output: Family) -> tuple[Family | None, 
     return (able[0] if able else None), able[1:]
 
 
+def _other_numbers(families: Sequence[Family], output: Family) -> str:
+    """How to go on where efforts or references of as many joints have other numbers than the positions."""
+    those = [
+        one
+        for one in families
+        if one is not output and not one.told and len(one.members) == len(output.members)
+        and (one.quantity == "effort" or one.commanded)
+    ]  # fmt: skip
+    if output.told or not those:
+        return ""
+    first = ", ".join(f"{one.pattern} from {min(one.members, key=int)}" for one in those)
+    return (
+        f": {output.pattern} is numbered from {min(output.members, key=int)}, {first}; give the columns of one joint one number, "
+        "in the table's heading"
+    )
+
+
 def _doubts_of_effort(effort: Family | None, others: Sequence[Family], command: Family | None) -> list[str]:
     """Doubts about the choice among several efforts."""
     if effort is None:
@@ -159,6 +179,11 @@ def _doubts_of_effort(effort: Family | None, others: Sequence[Family], command: 
             "effort: no other one was recorded than what the actuators were asked for, which they may not have made"
         ]
     doubts: list[str] = []
+    if not effort.first.unit and CURRENTS & set(words_of(effort.pattern.lower())):
+        doubts.append(
+            f"effort: {effort.pattern} is called a current; where it is in A, give it the torque or force of one ampere at each joint, such as  "
+            "scale: {JOINT: 10}"
+        )
     if others:
         listed = [one.pattern for one in others]
         why = not_read(listed) if says_it_was_read(effort.first) else f"{', '.join(listed)} may be it as well"
@@ -189,6 +214,11 @@ def _signals(
     bag, doubts = found.is_bag, list[str]()
     chosen = {"output": output.first} | ({"input": reference.first} if reference else {})
     clock, reason = header_clock(chosen) if bag else (found.clock, found.clock_reason)
+    alike = {frozenset(words_of(one)) - GENERIC for one in joints}
+    if output.told and any(frozenset(words_of(one)) - GENERIC not in alike for one in joints.values()):
+        doubts.append(
+            "joints: the recording has other names than the robot's file; they are matched by what differs among them"
+        )
     if not output.told:
         doubts.append(
             "joints: they are numbered in the recording; their order is taken to be that of the robot's file"

@@ -156,7 +156,7 @@ def freed_value(nominal: Model, fitted: Model, chosen: Hypothesis) -> str | None
     freed = [name for name in chosen.elements if name not in effects]
     beside = f" with {listed(effects)}" if effects else ""
     values = [
-        f"{name} is held at {with_written_unit(f'{held.value:.4g}', held.unit)}. Freed it comes out at {fitted.value(name):.4g}"
+        f"{_of_body(name)} is held at {with_written_unit(f'{held.value:.4g}', held.unit)}. Freed it comes out at {fitted.value(name):.4g}"
         for name, held in ((name, nominal.parameters[name]) for name in freed)
     ]
     what = "that value" if len(freed) == 1 else "these values"
@@ -167,6 +167,11 @@ def freed_value(nominal: Model, fitted: Model, chosen: Hypothesis) -> str | None
         f"{'. '.join(values)}, and that{beside} predicts the records better than any effect does while it is held: check {what}"
         f"{'' if file else ', or drop its ' + repr('fixed: true')}."
     )
+
+
+def _of_body(name: str) -> str:
+    """A value as the model's file names it; one of a body in words."""
+    return in_words(name) if name.startswith(f"{BODY}.") else name
 
 
 def recalibrated(nominal: Model, fitted: Model, stds: Mapping[str, float]) -> tuple[str, ...]:

@@ -5,11 +5,12 @@ from collections.abc import Mapping, Sequence
 from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
-from rhythmid.diagnose.constants import STATED
+from rhythmid.diagnose.constants import BLIND, STATED
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.joints.equivalents import shared_among
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, name_of
+from rhythmid.diagnose.joints.misfit import error_of
 from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.places import SENTENCES
 from rhythmid.identify.inverse_dynamics.estimate import size_of
@@ -50,16 +51,21 @@ def compose_machine(
         if label.removeprefix(f"{BODY}.") not in links
     ]
     missing += [_link(machine, one) for one in links.values()]
-    missing.sort(key=lambda one: -one.heldout_gain)
+    missing.sort(key=lambda one: (not _holds(one, answers), -one.heldout_gain))
     named = {one.joint for one in missing}
     unknown = tuple(j for j, one in answers.items() if one.verdict == "unknown_physics")
-    undecided = tuple(j for j, one in answers.items() if one.verdict == "undecided" and not stated[j])
+    sure = {one.joint for one in missing if _holds(one, answers)}
+    undecided = tuple(
+        j
+        for j, one in answers.items()
+        if one.verdict == "undecided" and j not in sure and (not stated[j] or j in named)
+    )
     verdict: Verdict = "consistent"
-    if missing:
+    if sure:
         verdict = "missing_physics"
     elif unknown:
         verdict = "unknown_physics"
-    elif undecided:
+    elif undecided or missing:
         verdict = "undecided"
     return MachineDiagnosis(
         verdict=verdict,
@@ -156,12 +162,16 @@ def summary_of_joints(
 
     For joints with unknown physics it names the quantity that the mismatch depends on; for undecided joints, the candidates.
     """
-    said = []
+    said, doubted = [], []
     for one in missing:
         what = f"the {one.of_link}" if one.link else in_words(one.element)
-        others = [] if one.probability >= STATED or one.link else _in_its_place(one, answers[one.joint])
+        if not _holds(one, answers):
+            doubted.append(f"{one.joint}: {what} (probability {one.probability:.2f})")
+            continue
+        others = [] if one.probability >= STATED else _in_its_place(one, answers)
         said.append(f"{one.joint}: {' or '.join([what, *others])}")
     words = f"The model is wrong at {'; '.join(said)}." if said else ""
+    words += f" In doubt: {'; '.join(doubted)}." if doubted else ""
     for why, joints in _alike(unknown, answers).items():
         words += f" At {', '.join(joints)} {why[0].lower()}{why[1:]}"
     for why, joints in _alike(undecided, answers).items():
@@ -169,9 +179,22 @@ def summary_of_joints(
     return words.strip() or "Nothing of practical size is missing at any joint."
 
 
-def _in_its_place(one: JointEffect, answer: Diagnosis) -> list[str]:
+def _holds(one: JointEffect, answers: Mapping[str, Diagnosis]) -> bool:
+    """Whether an effect is sure enough for the headline: by itself, or with those that are listed in its place.
+
+    Where the joint's own answer is undecided, what was fitted there has to explain the effort as an identified model does: what leaves more of it
+    may be the best of several wrong explanations.
+    """
+    answer = answers.get(one.joint)
+    if one.probability < STATED and not _in_its_place(one, answers):
+        return False
+    return answer is None or answer.verdict == "missing_physics" or error_of(answer.fit["augmented"]) < BLIND
+
+
+def _in_its_place(one: JointEffect, answers: Mapping[str, Diagnosis]) -> list[str]:
     """Effects that explain a joint as well as this one does, in words."""
-    groups = [group for group in answer.indistinguishable if one.element in group]
+    known = answers[one.joint].indistinguishable if one.joint in answers else ()
+    groups = [group for group in known if one.element in group]
     return [in_words(name) for group in groups for name in group if name != one.element]
 
 

@@ -23,6 +23,7 @@ from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.misfit import misfits
+from rhythmid.diagnose.joints.stated_fit import stated_fit
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
@@ -283,7 +284,7 @@ def _augmented(best: _Explained) -> Machine:
     inertial: dict[str, float] = {}
     spreads: dict[str, float] = {}
     for joint, one in best.found.items():
-        fitted = one.result.chosen if stated[joint] else one.result.nominal
+        fitted = stated_fit(one.result, stated[joint])
         path = machine.paths[joint]
         adopted = {
             *stated[joint],

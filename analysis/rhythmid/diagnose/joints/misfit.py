@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from rhythmid.diagnose.answer.result import Diagnosis, FitQuality
 from rhythmid.diagnose.constants import BLIND, HOPELESS
+from rhythmid.report.quantity import NONE
 
 
 def misfits(answers: Mapping[str, Diagnosis]) -> Iterator[str]:
@@ -13,7 +14,7 @@ def misfits(answers: Mapping[str, Diagnosis]) -> Iterator[str]:
     the effort than an identified model leaves.
     """
     for joint, answer in answers.items():
-        nominal, named = _error(answer.fit["refitted_nominal"]), _error(answer.fit["augmented"])
+        nominal, named = error_of(answer.fit["refitted_nominal"]), error_of(answer.fit["augmented"])
         if nominal < HOPELESS or named < BLIND:
             continue
         yield (
@@ -23,6 +24,19 @@ def misfits(answers: Mapping[str, Diagnosis]) -> Iterator[str]:
         )
 
 
-def _error(quality: FitQuality) -> float:
+def left_in_words(verdict: str, share: float, significant: bool, error: float | None) -> str:
+    """What is left of a joint's mismatch, in words; a dash where there is no mismatch.
+
+    A remainder in which no test finds a cause is noise only where the augmented model's `error` (share of the effort) is that of a model that is
+    identified.
+    """
+    if verdict == "consistent":
+        return NONE
+    if significant:
+        return f"{100.0 * share:.0f} % of the mismatch"
+    return "noise" if error is None or error < BLIND else "not explained"
+
+
+def error_of(quality: FitQuality) -> float:
     """Relative error of the effort, on held-out data if there are any."""
     return quality.train_nrmse if quality.heldout_nrmse is None else quality.heldout_nrmse

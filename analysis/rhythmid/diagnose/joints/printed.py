@@ -5,6 +5,7 @@ from rich.markup import escape
 
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
+from rhythmid.diagnose.joints.misfit import left_in_words
 from rhythmid.report.quantity import NONE, number, rounded
 from rhythmid.report.terminal_table import print_table
 
@@ -45,11 +46,8 @@ def show_diagnosis(found: MachineDiagnosis, console: Console) -> None:
 
 def left_words(one: Diagnosis) -> str:
     """The unexplained share of a joint's mismatch, in words; a dash where there is no mismatch."""
-    if one.verdict == "consistent":
-        return NONE
-    if not one.remainder.significant:
-        return "noise"
-    return f"{100.0 * one.remainder.share:.0f} % of the mismatch"
+    left = one.remainder
+    return left_in_words(one.verdict, left.share, left.significant, one.fit["augmented"].heldout_nrmse)
 
 
 def _share(error: float | None) -> str:

@@ -26,6 +26,7 @@ from rhythmid.identify.inverse_dynamics.estimate import (
     size_of,
 )
 from rhythmid.identify.joint import POOR_MOTION
+from rhythmid.identify.joints.adopted_inertia import adopted_inertia
 from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_inertia
 from rhythmid.identify.joints.correlation import Correlations
 from rhythmid.identify.joints.held_reference import balances_of, not_told
@@ -38,6 +39,7 @@ from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.same_recording import check_held_out
+from rhythmid.report.quantity import in_words
 from rhythmid.result import Result, Row
 from rhythmid.statistics import NORMAL_95
 
@@ -176,30 +178,41 @@ def identify_machine(
     found: dict[str, JointEstimate] = {}
     correlations: list[Correlations] = []
     errors: dict[str, float] = {}
-    identified = machine
     rotors = {
         joint: rotor_freed(model, machine.body.parameters[f"{joint}.armature"])
         for joint, model in balances.models.items()
     }
     balances = replace(balances, models=rotors)
     common = reference_delay(balances, balances.computed) if balances.computed else None
+    lates = {
+        joint: common.shared.value
+        for joint in machine.joints
+        if common is not None and joint in balances.computed
+    }
     for joint in machine.joints:
         tell(f"joint {joint}")
-        late = None if common is None or joint not in balances.computed else common.shared.value
-        balance = balances.balance(joint, late or 0.0)
+        balance = balances.balance(joint, lates.get(joint, 0.0))
         fit = fit_effort(balance, balances.models[joint], aligned=_aligned(balance, joint, common))
         fits[joint] = balance, fit
-        errors[joint] = fit.error / size_of(balance)
-        identified = _with_fit(identified, machine, joint, fit, late, found)
-        correlations.append(Correlations.of_fit(joint, fit))
-    inertia = None
+    inertia = better = None
     if not balances.computed:
         tell("inertias of the links")
         inertia = estimate_inertia(balances, fits)
+        better = adopted_inertia(balances, fits, inertia, seen, unseen, rotor_freed)
+    given, models = machine, balances.models
+    if better is not None:
+        given, models, fits = better.machine, dict(better.models), dict(better.fits)
+    identified = given
+    for joint, (balance, fit) in fits.items():
+        errors[joint] = fit.error / size_of(balance)
+        identified = _with_fit(identified, given, joint, fit, lates.get(joint), found)
+        correlations.append(Correlations.of_fit(joint, fit))
     tell("free runs")
     runs, notes = {}, [*machine.body.notes, *said, *of_holdout]
     if common is not None:
         notes.append(common.told)
+    if better is not None:
+        notes.append(better.note)
     others = JointBalances.of(machine, unseen, balances)
     try:
         made = free_runs(machine, others, unseen)
@@ -222,7 +235,7 @@ def identify_machine(
     return MachineIdentification(
         identified, found, told, (*_not_separable(told, balances.computed), *not_told(balances, seen)), inertia, errors,
         runs, True, worse, poor_joints(errors, runs.get("identified")), tuple(notes),
-        {joint: (balance, balances.models[joint], fit) for joint, (balance, fit) in fits.items()}, common,
+        {joint: (balance, models[joint], fit) for joint, (balance, fit) in fits.items()}, common,
     )  # fmt: skip
 
 
@@ -333,7 +346,7 @@ def _not_separable(correlations: Correlations, computed: Sequence[str]) -> tuple
     """Parameters that are not identifiable separately, in words."""
     said = []
     for first, second, value in correlations.close():
-        pair = f"{first} and {second}".replace("_", " ")
+        pair = in_words(f"{first} and {second}")
         said.append(f"{pair}: only a combination of the two is identifiable (correlation {value:.2f})")
     if computed:
         said.append(

@@ -18,7 +18,8 @@ from rhythmid.body.machine import Machine
 from rhythmid.errors import InputError
 from rhythmid.identify.channel_change import DEGREE, NAMED, UNITS
 from rhythmid.identify.joint import POOR_MOTION
-from rhythmid.identify.joints.joint_reading import Balanced, Reading, RecordedMotion
+from rhythmid.identify.joints.joint_reading import Balanced, Reading, RecordedMotion, mean_left
+from rhythmid.identify.joints.mounting import likely_mounting
 from rhythmid.identify.joints.reference_unit import reference_mend
 from rhythmid.identify.plausibility import BETTER_UNIT, LEAST_UNIT_FACTOR
 from rhythmid.record.joint_record import JointRecord
@@ -26,8 +27,9 @@ from rhythmid.report.quantity import number
 
 Readings = tuple[Reading, ...]
 CLEARLY = 0.5  # largest ratio of another reading's effort residual to that of the declared one
-FLOOR = 0.01  # share of an effort below which residuals are not compared further
-HELPS = 0.05  # least fall of the mean logarithm of the residuals for a change to be made and kept
+TELLS = 0.5  # least share of an effort's power that the body explains where a change of this joint alone is proposed
+RARER = 1.1  # weight of a change of positions: where a machine's mirror image moves alike, the effort's sign is the likelier change
+HELPS = 0.05  # least fall of the mean logarithm of the residuals for each change
 # factors for rotational and for prismatic joints
 POSITIONS = {True: (DEGREE, 1.0 / DEGREE), False: (1e-3, 1e3)}
 
@@ -54,10 +56,19 @@ def likely_joint_mend(machine: Machine, records: Sequence[JointRecord]) -> str |
         declared = motion.balanced(motion.as_declared)
         if all(one.left <= POOR_MOTION for one in declared):
             return None
+        told: list[tuple[float, str]] = []
         for free in (False, True):
-            found = _searched(motion, free)
-            if found != motion.as_declared and _convinces(motion, found, declared):
-                return f"{record.name}: {_words(motion, found, declared)}"
+            whole = _searched(motion, free)
+            for one in (_told_alone(motion, whole), whole):
+                if one != motion.as_declared and _convinces(motion, one, declared):
+                    told.append((_cost(motion, one), _words(motion, one, declared)))
+                    break
+        mounting = likely_mounting(motion)
+        if mounting is not None and _fits(mounting.left, declared):
+            words = f"{mounting.words()}. {_gain(motion, mounting.left, declared)}"
+            told.append((mean_left(mounting.left) + HELPS, words))
+        if told:
+            return f"{record.name}: {min(told)[1]}"
     return None
 
 
@@ -66,9 +77,26 @@ def _moved(record: JointRecord) -> float:
     return float(sum(np.std(one.output.value) for one in record.joints.values()))
 
 
-def _score(balanced: Iterable[Balanced]) -> float:
-    """Mean logarithm of the effort residuals: the improvement of one joint counts, whatever the other joints do."""
-    return float(np.mean([math.log(one.left + FLOOR) for one in balanced]))
+def _changes(motion: RecordedMotion, readings: Readings) -> float:
+    """How much a reading changes: what is the same at every joint is one change, an exchange of two joints is one."""
+    moved = sum(one.source != own.source for one, own in zip(readings, motion.as_declared, strict=True))
+    found = float((moved + 1) // 2)
+    for channel, cost in (("position", RARER), ("effort", 1.0)):
+        made = [_sort(getattr(one, channel)) for one in readings]
+        changed = len(made) - made.count("")
+        found += cost * min([changed, *(1 + len(made) - made.count(kind) for kind in set(made) - {""})])
+    return found
+
+
+def _sort(factor: float) -> str:
+    """What kind of change a factor is; nothing where it is none."""
+    unit = "" if abs(factor) == 1.0 else f"{math.log10(abs(factor)):.0f}"
+    return f"-{unit}" if factor < 0.0 else unit
+
+
+def _cost(motion: RecordedMotion, readings: Readings, free: bool = False) -> float:
+    """Mean logarithm of the residuals under a reading, plus the fall that its changes have to bring."""
+    return mean_left(motion.balanced(readings, free)) + HELPS * _changes(motion, readings)
 
 
 def _searched(motion: RecordedMotion, free: bool) -> Readings:
@@ -76,17 +104,17 @@ def _searched(motion: RecordedMotion, free: bool) -> Readings:
     effort."""
 
     def score(readings: Readings) -> float:
-        return _score(motion.balanced(readings, free))
+        return _cost(motion, readings, free)
 
     best = motion.as_declared
     least = score(best)
     while True:
         tried = ((score(one), one) for one in _changed(motion, best, free))
         found, reading = min(tried, key=lambda one: one[0])
-        if found > least - HELPS:
+        if found >= least:
             tried = ((score(one), one) for one in _cycled(best))
             found, reading = min(tried, key=lambda one: one[0], default=(math.inf, best))
-        if found > least - HELPS:
+        if found >= least:
             break
         best, least = reading, found
     # an earlier change may not help any more after later ones
@@ -97,7 +125,7 @@ def _searched(motion: RecordedMotion, free: bool) -> Readings:
             replace(best[place], position=given.position, effort=given.effort),
         ):
             back = _with(best, place, one)
-            if back != best and score(back) < least + HELPS:
+            if back != best and score(back) < least:
                 best, least = back, score(back)
     return _in_units(motion, best) if free else best
 
@@ -152,18 +180,48 @@ def _moved_round(readings: Readings, places: Sequence[int]) -> Readings:
     return tuple(made)
 
 
+def _told_alone(motion: RecordedMotion, found: Readings) -> Readings:
+    """The reading without what it changes at joints of which the body tells too little; changes that most joints have stay together."""
+    kinds = [(_sort(one.position), _sort(one.effort)) for one in found]
+    return tuple(
+        one if known.told >= TELLS or one.source != own.source or 2 * kinds.count(kind) > len(found) else own
+        for one, own, known, kind in zip(
+            found, motion.as_declared, motion.balanced(found), kinds, strict=True
+        )
+    )
+
+
 def _convinces(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]) -> bool:
     """Whether a reading explains by the body what the declared one does not. An effort that a controller applies
     against the motion looks, with the opposite sign, like that of a spring and a damper."""
     left = motion.balanced(found)
     changed = [k for k, (one, own) in enumerate(zip(found, motion.as_declared, strict=True)) if one != own]
     before, after = (_rms(one.left for one in many) for many in (declared, left))
-    return (
+    return _explains(left, declared) or (
         after <= CLEARLY * before
         and all(left[k].left <= POOR_MOTION for k in changed)
         and max(left[k].left for k in changed) <= BETTER_UNIT * max(declared[k].left for k in changed)
         and _rms(left[k].left for k in changed) <= CLEARLY * _rms(left[k].bare for k in changed)
     )
+
+
+def _fits(left: Sequence[Balanced], declared: Sequence[Balanced]) -> bool:
+    """Whether what is no fault of one joint explains the efforts of all of them."""
+    before, after = (_rms(one.left for one in many) for many in (declared, left))
+    well = after <= CLEARLY * before and all(one.left <= POOR_MOTION for one in left)
+    return well or _explains(left, declared)
+
+
+def _explains(left: Sequence[Balanced], declared: Sequence[Balanced]) -> bool:
+    """Whether the body explains the efforts of all joints together, and as declared explains hardly any.
+
+    A joint counts by what the body has to say of it: one that carries no weight moves by friction under any reading.
+    """
+    told, before = ([one.told for one in many] for many in (left, declared))
+    if sum(told) < 1.0 or sum(before) > CLEARLY * sum(told):
+        return False
+    weighted = math.sqrt(sum(share * one.left**2 for share, one in zip(told, left, strict=True)) / sum(told))
+    return weighted <= CLEARLY
 
 
 def _rms(values: Iterable[float]) -> float:
@@ -186,18 +244,33 @@ def _words(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]
             factor = getattr(one, channel)
             if factor != 1.0:
                 factors.setdefault(_guess(channel, factor, turns), {})[joint] = factor
-        for guess, those in factors.items():
-            roles = "'effort:'" if channel == "effort" else "'output:'"
-            if channel == "position" and any(joint in motion.computed for joint in those):
-                roles += " and 'input:'"
-            names = "every joint" if len(those) == len(joints) else ", ".join(those)
-            said.append(f"the {channel} of {names} {guess}; write  {_scale(those, joints)}  under {roles}")
+        if not factors:
+            continue
+        clauses = [
+            f"{'every joint' if len(those) == len(joints) else ', '.join(those)} {guess}"
+            for guess, those in factors.items()
+        ]
+        every = {joint: factor for those in factors.values() for joint, factor in those.items()}
+        roles = "'effort:'" if channel == "effort" else "'output:'"
+        if channel == "position" and any(joint in motion.computed for joint in every):
+            roles += " and 'input:'"
+        said.append(
+            f"the {channel} of {', that of '.join(clauses)}; write  {_scale(every, joints)}  under {roles}"
+        )
     mirrored = tuple(replace(one, position=-one.position, effort=-one.effort) for one in found)
-    if any(one.position < 0.0 for one in found) and _score(motion.balanced(mirrored)) < _score(left) + HELPS:
+    if (
+        any(one.position < 0.0 for one in found)
+        and mean_left(motion.balanced(mirrored)) < mean_left(left) + HELPS
+    ):
         said[-1] += " (or the same for the other joints: the mirrored machine moves alike)"
-    worst = max(range(len(joints)), key=lambda k: declared[k].left - left[k].left)
+    return f"{'; '.join(said)} in signals.yaml. {_gain(motion, left, declared)}"
+
+
+def _gain(motion: RecordedMotion, left: Sequence[Balanced], declared: Sequence[Balanced]) -> str:
+    """How much less of an effort is left at the joint where this is most."""
+    worst = max(range(len(left)), key=lambda k: declared[k].left - left[k].left)
     return (
-        f"{'; '.join(said)} in signals.yaml. The body then leaves {100.0 * left[worst].left:.0f} % of the effort at {joints[worst]} "
+        f"The body then leaves {100.0 * left[worst].left:.0f} % of the effort at {motion.joints[worst]} "
         f"instead of {100.0 * declared[worst].left:.0f} %"
     )
 

@@ -6,7 +6,9 @@ effort is fitted with this force and with losses that no file states: a rotor, a
 all nonnegative, and a constant. A wrong sign of an effort would need negative losses.
 """
 
+import copy
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -28,6 +30,11 @@ Array = NDArray[np.float64]
 POSES = 300  # number of poses at which readings are compared
 FEW = 60  # least number of poses without contact for a reading
 NEIGHBOURS = 3  # poses within the filter's length at which contact is checked
+LOSSES = ("damper", "dry friction", "spring", "rotor")  # of each joint, beside gravity
+REWEIGHTED = 3  # times that joints are weighted again by the residuals of their efforts: more change no digit that is written
+LEAST_SHARE = 0.02  # least relative residual used as a weight: the noise of a good sensor
+TINY = 1e-12  # [N or N*m] standard deviation of an effort that is zero throughout
+FLOOR = 0.01  # share of an effort below which residuals are not compared further
 LONGEST = 60.0  # [s] length of a record that is used, from its start
 
 
@@ -51,6 +58,26 @@ class Balanced:
     left: float
     gain: float = 1.0
     bare: float = 1.0
+
+    @property
+    def told(self) -> float:
+        """The share of the effort's power that the body explains, of what losses by themselves leave."""
+        return max(0.0, 1.0 - (self.left / self.bare) ** 2) if self.bare > 0.0 else 0.0
+
+
+def mean_left(balanced: Iterable[Balanced]) -> float:
+    """Mean logarithm of what is left of the efforts: one joint that comes right counts, whatever the others do."""
+    return float(np.mean([math.log(one.left + FLOOR) for one in balanced]))
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Poses (n, nq), rates and accelerations (n, nv), and the effort (n,) of each joint under a reading."""
+
+    pose: Array
+    rate: Array
+    acceleration: Array
+    effort: tuple[Array, ...]
 
 
 class RecordedMotion:
@@ -94,6 +121,46 @@ class RecordedMotion:
 
     def balanced(self, readings: tuple[Reading, ...], free: bool = False) -> tuple[Balanced, ...]:
         """Effort residuals of each joint under a reading; with `free`, efforts may be in any unit."""
+        seen = self.seen(readings)
+        if seen is None:
+            return tuple(Balanced(1.0) for _ in readings)
+        force = self.body.inverse(seen.pose, seen.rate, seen.acceleration)
+        return tuple(
+            _fitted(effort, force[:, own] - rotor * a, x, v, a, free)
+            for effort, own, rotor, (x, v, a) in zip(
+                seen.effort, self._velocities, self._armature, self._along(seen), strict=True
+            )
+        )
+
+    def mounted(self, gravity: Array) -> "RecordedMotion":
+        """The same motion of a body on which gravity (3,) [m/s^2] acts."""
+        made = copy.copy(self)
+        made.body = self.body.with_gravity(gravity)
+        return made
+
+    def gravity(self) -> Array:
+        """The gravity (3,) [m/s^2] under which least is left of the efforts of all joints as they are declared."""
+        seen = self.seen(self.as_declared)
+        if seen is None:
+            return self.body.gravity
+        motion = seen.pose, seen.rate, seen.acceleration
+        without = self.body.with_gravity(np.zeros(3)).inverse(*motion)
+        weight = np.stack([self.body.with_gravity(axis).inverse(*motion) - without for axis in np.eye(3)])
+        found, share = self.body.gravity, np.ones(len(self.joints))
+        for _ in range(REWEIGHTED):
+            made = [
+                (_columns(weight[:, :, own].T, x, v, a), effort - without[:, own] + rotor * a)
+                for effort, own, rotor, (x, v, a) in zip(
+                    seen.effort, self._velocities, self._armature, self._along(seen), strict=True
+                )
+            ]
+            scale = share * np.array([max(float(np.std(one)), TINY) for one in seen.effort])
+            found, left = _shared(made, scale)
+            share = np.maximum(left / scale * share, LEAST_SHARE)
+        return found
+
+    def seen(self, readings: tuple[Reading, ...]) -> "Seen | None":
+        """The motion and the efforts under a reading, poses in contact left out; None where these are too many."""
         sources = [one.source for one in readings]
         factors = np.array([one.position for one in readings])
         clear = np.ones(len(self._pose), dtype=bool)
@@ -102,21 +169,24 @@ class RecordedMotion:
             touched = self.body.touches(beside, TOUCHING_DISTANCE).reshape(len(self._beside), -1)
             clear = ~np.any(touched, axis=0)
         if clear.sum() < min(FEW, len(clear)):
-            return tuple(Balanced(1.0) for _ in readings)
+            return None
         pose = self._read(self._pose[clear], self._positions, sources, factors)
         rate, acceleration = (
             self._read(one[clear], self._velocities, sources, factors)
             for one in (self._rate, self._acceleration)
         )
-        force = self.body.inverse(pose, rate, acceleration)
-        found = []
-        for place, one in enumerate(readings):
-            factor = one.position if self.joints[place] in self.computed else one.effort
-            own, a = self._velocities[place], acceleration[:, self._velocities[place]]
-            asked = force[:, own] - self._armature[place] * a  # without the rotor, which is fitted
-            effort = factor * self._effort[clear, one.source]
-            found.append(_fitted(effort, asked, pose[:, self._positions[place]], rate[:, own], a, free))
-        return tuple(found)
+        effort = [
+            (one.position if joint in self.computed else one.effort) * self._effort[clear, one.source]
+            for joint, one in zip(self.joints, readings, strict=True)
+        ]
+        return Seen(pose, rate, acceleration, tuple(effort))
+
+    def _along(self, seen: "Seen") -> list[tuple[Array, Array, Array]]:
+        """Position, velocity and acceleration (n,) of each joint."""
+        return [
+            (seen.pose[:, at], seen.rate[:, own], seen.acceleration[:, own])
+            for at, own in zip(self._positions, self._velocities, strict=True)
+        ]
 
     @staticmethod
     def _read(values: Array, places: list[int], sources: list[int], factors: Array) -> Array:
@@ -135,6 +205,33 @@ def _fitted(effort: Array, asked: Array, x: Array, v: Array, a: Array, free: boo
     _, bare = _without_sign(losses, effort)
     size = float(np.std(effort))
     return Balanced(min(left / size, 1.0), float(values[-1]) if free else 1.0, min(bare / size, 1.0))
+
+
+def _columns(weight: Array, x: Array, v: Array, a: Array) -> Array:
+    """Columns (n, 10) for a joint: its weight under gravity along each axis either way, and its losses and rotor."""
+    return np.column_stack([weight, -weight, v, np.sign(v), x, a])
+
+
+def _shared(joints: Sequence[tuple[Array, Array]], scale: Array) -> tuple[Array, Array]:
+    """Gravity (3,) that all joints share, and the rms left at each; `joints` are columns and what is wanted, to be divided by `scale`."""
+    own = len(LOSSES)
+    whole = np.zeros((sum(len(wanted) for _, wanted in joints), 6 + own * len(joints)))
+    wanted = np.zeros(len(whole))
+    begin, parts = 0, []
+    for place, ((columns, one), size) in enumerate(zip(joints, scale, strict=True)):
+        part = slice(begin, begin := begin + len(one))
+        centred = (columns - columns.mean(axis=0)) / size
+        whole[part, :6] = centred[:, :6]
+        whole[part, 6 + own * place : 6 + own * (place + 1)] = centred[:, 6:]
+        wanted[part] = (one - one.mean()) / size
+        parts.append(part)
+    norms = np.linalg.norm(whole, axis=0)
+    norms[norms == 0.0] = 1.0
+    values, _ = nnls(whole / norms, wanted)
+    values = values / norms
+    missed = wanted - whole @ values
+    left = np.array([float(np.sqrt(np.mean(missed[part] ** 2))) for part in parts]) * scale
+    return values[:3] - values[3:6], left
 
 
 def _without_sign(columns: Array, wanted: Array) -> tuple[Array, float]:

@@ -1,0 +1,48 @@
+"""A saved model has the effects that the answer states, and no others."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+from rhythmid.diagnose.joints.stated_fit import stated_fit
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.model import Model
+
+CATALOGUE = load_catalogue()
+PLAIN = Model.from_text("inertia: {mass: {value: 1.0, unit: kg}}\n", catalogue=CATALOGUE)
+VALUES = {
+    "coulomb_friction": {"force": 1.0},
+    "linear_spring": {"stiffness": 1.0, "rest_length": 0.0},
+}
+
+
+@dataclass(frozen=True)
+class Fit:
+    model: Model
+
+
+@dataclass(frozen=True)
+class Found:
+    elements: tuple[str, ...]
+    fit: Fit
+
+
+def found(*labels: str) -> Any:
+    model = PLAIN
+    for label in labels:
+        model = model.with_element(CATALOGUE[label], VALUES[label])
+    return Found(labels, Fit(model))
+
+
+def result(chosen: Any, *others: Any) -> Any:
+    search = SimpleNamespace(hypotheses=(found(), *others, chosen))
+    return SimpleNamespace(chosen=chosen, nominal=found(), search=search)
+
+
+def test_effects_that_are_not_stated_are_not_in_the_model_that_is_saved():
+    both, alone = found("coulomb_friction", "linear_spring"), found("coulomb_friction")
+    assert stated_fit(result(both, alone), ("coulomb_friction",)) is alone
+    kept = stated_fit(result(both), ("coulomb_friction",))
+    assert [term.label for term in kept.fit.model.terms] == ["coulomb_friction"]
+    assert stated_fit(result(both, alone), ("coulomb_friction", "linear_spring")) is both
+    assert stated_fit(result(both, alone), ()).elements == ()
