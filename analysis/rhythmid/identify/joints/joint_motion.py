@@ -5,7 +5,7 @@ inverse dynamics of the whole body (M. Gautier, W. Khalil, Int. J. Robot. Res. 1
 parameters). So each joint is balanced as the one of a machine of one axis, with the same elements.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -79,7 +79,8 @@ class JointBalances:
 
     `computed` are the joints whose effort is what their controller's known gains make of the reference; `leads` [s] of others are what the
     references in their recorded efforts were ahead by, and are not in the motions. `rotor_like` are by joint the parameters of links that
-    do there what the rotor's inertia does, with how much of that [kg m²] a unit of each is.
+    do there what the rotor's inertia does, with how much of that [kg m²] a unit of each is. `refuted` are the pairs of a joint and a link's
+    parameter that is not freed there, because the other joints refute the value that it takes.
     """
 
     machine: Machine
@@ -91,6 +92,7 @@ class JointBalances:
     computed: tuple[str, ...]
     leads: Mapping[str, float] = field(default_factory=dict)
     rotor_like: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    refuted: frozenset[tuple[str, str]] = frozenset()
 
     @classmethod
     def of(
@@ -100,7 +102,10 @@ class JointBalances:
         alike: "JointBalances | None" = None,
     ) -> "JointBalances":
         """The balances of these records, filtered as those `alike` and without the same leads. Raises InputError where the records hold
-        too little."""
+        too little.
+
+        What a joint feels is that of those `alike`, too, unless payloads sit at other places.
+        """
         stretches = joint_stretches(machine, records)
         cut, dominant = (alike.cut, alike.dominant) if alike else _cut(machine, stretches)
         bodies = [_body_motion(machine, one, cut) for one in stretches]
@@ -110,15 +115,18 @@ class JointBalances:
         columns = [machine.body.columns(names, one.pose, one.rate, one.acceleration) for one in bodies]
         models: dict[str, Model] = {}
         motions: dict[str, list[Motion]] = {}
-        rotor_like = dict(alike.rotor_like) if alike else {}
+        known = alike if alike and _same_places(machine, alike.machine) else None
+        rotor_like = dict(known.rotor_like) if known else {}
+        refuted = alike.refuted if alike else frozenset()
         for joint in machine.joints:
-            seen = alike.links(joint) if alike else _links(machine, joint, names, columns, bodies)
-            if not alike:
+            seen = known.links(joint) if known else _links(machine, joint, names, columns, bodies)
+            if not known:
                 rotor_like[joint] = _rotors(machine, joint, seen, names, columns, bodies)
             rotors = rotor_like[joint]
             computed = joint in stretches[0].reference  # what a controller asks for goes into its actuator
             taken = "before_actuator" if computed else records[0].taken
-            models[joint] = joint_model(machine, joint, taken, seen, rotors)
+            held = {name for at, name in refuted if at == joint}
+            models[joint] = joint_model(machine, joint, taken, seen, rotors, held)
             made = []
             for body, column in zip(bodies, columns, strict=True):
                 own = {link: column[:, :, names.index(link)] for link in seen}
@@ -131,7 +139,9 @@ class JointBalances:
             else {joint: _bandwidth(motions[joint], cut, dominant) for joint in machine.joints}
         )
         computed = tuple(joint for joint in machine.joints if joint in stretches[0].reference)
-        made = cls(machine, models, motions, bandwidths, bodies, period, computed, rotor_like=rotor_like)
+        made = cls(
+            machine, models, motions, bandwidths, bodies, period, computed, rotor_like=rotor_like, refuted=refuted
+        )
         return made.with_leads(alike.leads) if alike else made
 
     def with_leads(self, leads: Mapping[str, float]) -> "JointBalances":
@@ -148,6 +158,10 @@ class JointBalances:
                 for motion, body in zip(self.motions[joint], self.bodies, strict=True)
             ]
         return replace(self, motions=motions, leads={**self.leads, **leads})
+
+    def without(self, joint: str, parameter: str) -> "JointBalances":
+        """The balances in which the search at a joint does not free a parameter of a link."""
+        return replace(self, refuted=self.refuted | {(joint, parameter)})
 
     def links(self, joint: str) -> tuple[str, ...]:
         """The links whose masses and inertias a joint feels, as "link.mass" and "link.inertia", and those whose payloads it would feel, as
@@ -186,11 +200,16 @@ def _later(motion: Motion, model: Model, late: float) -> Motion:
 
 
 def joint_model(
-    machine: Machine, joint: str, taken: Taken, links: Sequence[str], rotors: Mapping[str, float]
+    machine: Machine,
+    joint: str,
+    taken: Taken,
+    links: Sequence[str],
+    rotors: Mapping[str, float],
+    held: Collection[str] = (),
 ) -> Model:
     """The path of a joint as a model of one axis, with masses, inertias and payloads of links as parameters of a term `body`; without its
     actuator where the effort was recorded behind that. A mass or an inertia that does what the rotor's does, one of `rotors`, may be less than given by
-    more than the whole rotor: any other change is the rotor's, of which files of robots know little."""
+    more than the whole rotor: any other change is the rotor's, of which files of robots know little. Those `held` are no candidates."""
     path = machine.paths[joint]
     terms = [t for t in path.terms if taken != "after_actuator" or t.element.slot != "actuator"]
     known, values = machine.body.parameters, {}
@@ -198,7 +217,7 @@ def joint_model(
         said = machine.inertial.get(link)
         most = max(known[link] - known[f"{joint}.armature"] / rotors[link], 0.0) if link in rotors else np.inf
         values[link] = said or Value(known[link], described(link).unit, True, (0.0, most))
-    parameters = tuple(replace(described(link), name=link) for link in links)
+    parameters = tuple(replace(described(link), name=link, fixed=link in held) for link in links)
     element = Element(
         name=BODY, slot="force", title="Body", equation="coupling", parameters=parameters, reference="", kernel=nothing,
         acts="drive", candidate=False,
@@ -234,6 +253,12 @@ def _body_motion(machine: Machine, stretch: JointStretch, cut: float) -> BodyMot
     acceleration = CubicSpline(time, rate).derivative()(time)
     force = machine.body.inverse(pose, rate, acceleration)
     return BodyMotion(stretch, time, pose, rate, acceleration, force, stretch.period * every, every)
+
+
+def _same_places(one: Machine, other: Machine) -> bool:
+    """Whether the payloads of two machines sit at the same places of their links."""
+    ends = one.body.ends, other.body.ends
+    return ends[0].keys() == ends[1].keys() and all(np.array_equal(ends[0][n], ends[1][n]) for n in ends[0])
 
 
 def _links(
