@@ -22,9 +22,11 @@ from rhythmid.diagnose.joints.equivalents import equivalent_names, equivalents
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
+from rhythmid.diagnose.joints.link_evidence import weight_of_joints
 from rhythmid.diagnose.joints.misfit import misfits
 from rhythmid.diagnose.joints.stated_fit import stated_fit
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
+from rhythmid.diagnose.rejections import decisive
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.joints.held_reference import balances_of, likely_readings
@@ -167,21 +169,28 @@ def _explained(
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
     delay = reference_delay(balances, balances.computed) if balances.computed else None
     found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget, delay)
-    for _ in range(max(MOST_LINKS, len(machine.body.links))):
-        if budget.spent:
-            break
+    most = max(MOST_LINKS, len(machine.body.links))
+    while len(links) < most and len(balances.refuted) < most and not budget.spent:
         best = _heaviest(found, set(links))
         if best is None:
             break
         link, result = best
-        links[link] = wrong_link(balances, records, found, link, result)
-        machine = links[link].put_right(machine)
-        balances = JointBalances.of(machine, records, balances)
-        unseen = JointBalances.of(machine, holdout, balances) if holdout else None
-        again = [joint for joint in machine.joints if link in balances.links(joint)]
-        delay = reference_delay(balances, balances.computed) if balances.computed else None
-        better, refused = _searched(balances, unseen, again, catalogue, tell, budget, delay)
-        found = {**found, **better}
+        wrong = wrong_link(balances, records, found, link, result)
+        tried = wrong.put_right(machine)
+        changed = JointBalances.of(tried, records, balances)
+        again = [joint for joint in machine.joints if link in changed.links(joint)]
+        unseen = JointBalances.of(tried, holdout, changed) if holdout else None
+        late = reference_delay(changed, changed.computed) if changed.computed else None
+        better, refused_now = _searched(changed, unseen, again, catalogue, tell, budget, late)
+        if weight_of_joints(found, better, again) < -decisive(1) and not budget.spent:
+            tell(f"{link} of {result.joint} is refuted by the joints that it moves")
+            balances = JointBalances.of(machine, records, balances.without(result.joint, link))
+            unseen = JointBalances.of(machine, holdout, balances) if holdout else None
+            better, refused_now = _searched(balances, unseen, [result.joint], catalogue, tell, budget, delay)
+        else:
+            links[link] = wrong
+            machine, balances, delay = tried, changed, late
+        found, refused = {**found, **better}, {**refused, **refused_now}
     return _Explained(machine, found, refused, links, balances.leads, delay)
 
 

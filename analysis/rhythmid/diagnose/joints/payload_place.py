@@ -16,6 +16,7 @@ from rhythmid.body.body import BODY
 from rhythmid.body.inertial_parameter import PAYLOAD
 from rhythmid.body.link_inertia import point_mass
 from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.diagnose.joints.link_evidence import own_path
 from rhythmid.identify.inverse_dynamics.estimate import fit_effort
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.least_squares import orthonormal
@@ -57,7 +58,7 @@ def placed_payload(
 ) -> PlacedPayload:
     """Mass and place of the payload of a link; `shown_at` is the joint whose search found it.
 
-    That joint keeps its chosen path, the others their given ones; all paths are refitted together with the payload.
+    That joint keeps its chosen path, the others the effects found there; all paths are refitted together with the payload.
     """
     machine, parameter = balances.machine, f"{link}.{PAYLOAD}"
     end, chosen = machine.body.ends[link], found[shown_at].result.chosen.model
@@ -66,8 +67,8 @@ def placed_payload(
     for _ in range(ROUNDS):
         now = JointBalances.of(machine.with_payload(link, float(value[0]), value[1:]), records, balances)
         rows = []
-        for joint in (one for one in found if parameter in balances.links(one)):
-            model = chosen if joint == shown_at else now.models[joint]
+        for joint in (one for one in found if parameter in now.links(one)):
+            model = chosen if joint == shown_at else own_path(now, found[joint])
             held = model.with_parameters(
                 {f"{BODY}.{parameter}": now.models[joint].parameters[f"{BODY}.{parameter}"]}
             )

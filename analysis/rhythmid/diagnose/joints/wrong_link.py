@@ -10,6 +10,7 @@ from rhythmid.body.inertial_parameter import MASS, PAYLOAD, TURNING, split
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.diagnose.joints.link_evidence import shared_estimate
 from rhythmid.diagnose.joints.payload_place import placed_payload
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
@@ -70,4 +71,5 @@ def wrong_link(
     ):  # the search changed the mass together with the inertia of its shape
         known = shown.case.nominal
         size += known.value(label) * (chosen.model.value(mass) / known.value(mass) - 1.0)
-    return WrongLink(parameter, {kind: Estimate(size, chosen.std().get(label, 0.0), value.unit)}, shown)
+    own = Estimate(size, chosen.std().get(label, 0.0), value.unit)
+    return WrongLink(parameter, {kind: shared_estimate(balances, found, parameter, shown, own)}, shown)

@@ -6,7 +6,7 @@ the rest of the whole body's inverse dynamics (linear in the inertial parameters
 Robot. Res. 11 (1992) 362). So each joint has the balance of a machine with one axis, with the same elements.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -81,7 +81,8 @@ class JointBalances:
     `computed` are the joints whose effort is computed from the reference and their controller's known gains.
     `leads` [s] of other joints are the leads of references in their recorded efforts, already removed from the
     motions. `rotor_like` holds by joint the link parameters with the same effect there as the rotor's inertia, with
-    the inertia [kg m²] per unit of each.
+    the inertia [kg m²] per unit of each. `refuted` holds pairs of a joint and a link's parameter that is not freed
+    there, because the other joints refute its estimate.
     """
 
     machine: Machine
@@ -93,6 +94,7 @@ class JointBalances:
     computed: tuple[str, ...]
     leads: Mapping[str, float] = field(default_factory=dict)
     rotor_like: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    refuted: frozenset[tuple[str, str]] = frozenset()
 
     @classmethod
     def of(
@@ -102,7 +104,10 @@ class JointBalances:
         alike: "JointBalances | None" = None,
     ) -> "JointBalances":
         """The balances of these records, with the filters of `alike` and without the same leads. Raises InputError
-        where the records are too short."""
+        where the records are too short.
+
+        The forces at each joint are those of `alike`, too, unless payloads are at other places.
+        """
         stretches = joint_stretches(machine, records)
         cut, dominant = (alike.cut, alike.dominant) if alike else _cut(machine, stretches)
         bodies = [_body_motion(machine, one, cut) for one in stretches]
@@ -112,16 +117,19 @@ class JointBalances:
         columns = [machine.body.columns(names, one.pose, one.rate, one.acceleration) for one in bodies]
         models: dict[str, Model] = {}
         motions: dict[str, list[Motion]] = {}
-        rotor_like = dict(alike.rotor_like) if alike else {}
+        known = alike if alike and _same_places(machine, alike.machine) else None
+        rotor_like = dict(known.rotor_like) if known else {}
+        refuted = alike.refuted if alike else frozenset()
         for joint in machine.joints:
-            seen = alike.links(joint) if alike else _links(machine, joint, names, columns, bodies)
-            if not alike:
+            seen = known.links(joint) if known else _links(machine, joint, names, columns, bodies)
+            if not known:
                 rotor_like[joint] = _rotors(machine, joint, seen, names, columns, bodies)
             rotors = rotor_like[joint]
             # the force that a controller commands enters its actuator
             computed = joint in stretches[0].reference
             taken = "before_actuator" if computed else records[0].taken
-            models[joint] = joint_model(machine, joint, taken, seen, rotors)
+            held = {name for at, name in refuted if at == joint}
+            models[joint] = joint_model(machine, joint, taken, seen, rotors, held)
             made = []
             for body, column in zip(bodies, columns, strict=True):
                 own = {link: column[:, :, names.index(link)] for link in seen}
@@ -134,7 +142,17 @@ class JointBalances:
             else {joint: _bandwidth(motions[joint], cut, dominant) for joint in machine.joints}
         )
         computed = tuple(joint for joint in machine.joints if joint in stretches[0].reference)
-        made = cls(machine, models, motions, bandwidths, bodies, period, computed, rotor_like=rotor_like)
+        made = cls(
+            machine,
+            models,
+            motions,
+            bandwidths,
+            bodies,
+            period,
+            computed,
+            rotor_like=rotor_like,
+            refuted=refuted,
+        )
         return made.with_leads(alike.leads) if alike else made
 
     def with_leads(self, leads: Mapping[str, float]) -> "JointBalances":
@@ -151,6 +169,10 @@ class JointBalances:
                 for motion, body in zip(self.motions[joint], self.bodies, strict=True)
             ]
         return replace(self, motions=motions, leads={**self.leads, **leads})
+
+    def without(self, joint: str, parameter: str) -> "JointBalances":
+        """The balances in which the search at a joint does not free a parameter of a link."""
+        return replace(self, refuted=self.refuted | {(joint, parameter)})
 
     def links(self, joint: str) -> tuple[str, ...]:
         """Links to whose mass and inertia a joint is sensitive, as "link.mass" and "link.inertia", and those to
@@ -189,14 +211,20 @@ def _later(motion: Motion, model: Model, late: float) -> Motion:
 
 
 def joint_model(
-    machine: Machine, joint: str, taken: Taken, links: Sequence[str], rotors: Mapping[str, float]
+    machine: Machine,
+    joint: str,
+    taken: Taken,
+    links: Sequence[str],
+    rotors: Mapping[str, float],
+    held: Collection[str] = (),
 ) -> Model:
     """The path of a joint as a model with one axis; masses, inertias and payloads of links are parameters of a term
     `body`.
 
     The actuator is left out where the effort was recorded after it. A mass or inertia in `rotors` has the same
     effect as the rotor's inertia. Its upper bound is the given value minus the equivalent of the whole rotor: any
-    smaller change is attributed to the rotor, which files of robots seldom state well.
+    smaller change is attributed to the rotor, which files of robots seldom state well. Parameters that are `held`
+    are no candidates.
     """
     path = machine.paths[joint]
     terms = [t for t in path.terms if taken != "after_actuator" or t.element.slot != "actuator"]
@@ -205,7 +233,7 @@ def joint_model(
         said = machine.inertial.get(link)
         most = max(known[link] - known[f"{joint}.armature"] / rotors[link], 0.0) if link in rotors else np.inf
         values[link] = said or Value(known[link], described(link).unit, True, (0.0, most))
-    parameters = tuple(replace(described(link), name=link) for link in links)
+    parameters = tuple(replace(described(link), name=link, fixed=link in held) for link in links)
     element = Element(
         name=BODY, slot="force", title="Body", equation="coupling", parameters=parameters, reference="", kernel=nothing,
         acts="drive", candidate=False,
@@ -241,6 +269,12 @@ def _body_motion(machine: Machine, stretch: JointStretch, cut: float) -> BodyMot
     acceleration = CubicSpline(time, rate).derivative()(time)
     force = machine.body.inverse(pose, rate, acceleration)
     return BodyMotion(stretch, time, pose, rate, acceleration, force, stretch.period * every, every)
+
+
+def _same_places(one: Machine, other: Machine) -> bool:
+    """Whether the payloads of two machines sit at the same places of their links."""
+    ends = one.body.ends, other.body.ends
+    return ends[0].keys() == ends[1].keys() and all(np.array_equal(ends[0][n], ends[1][n]) for n in ends[0])
 
 
 def _links(

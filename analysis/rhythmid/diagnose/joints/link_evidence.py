@@ -1,0 +1,128 @@
+"""A value of a link is the same for all joints that it moves: its estimate from all of them, and the evidence of all of them for it.
+
+Each joint is judged with the effects that were found at that joint, because a friction that is not explained looks like any value.
+"""
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+from rhythmid.body.body import BODY
+from rhythmid.diagnose.answer.result import Estimate
+from rhythmid.diagnose.effort.candidate import widest, with_freed
+from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.evidence import predict
+from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.identify.inverse_dynamics.estimate import fit_effort, linearise
+from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.identify.robust_covariance import with_robust_std
+from rhythmid.model import Model
+from rhythmid.value import Prior
+
+CONTRADICTS = (
+    3.0  # standard deviations between what two joints make of a value, above which they do not mean the same
+)
+
+
+def own_path(balances: JointBalances, one: JointResult) -> Model:
+    """The path of a joint with the effects found there, and with the values of the body as they are given."""
+    given = balances.models[one.joint].term(BODY)
+    model = one.result.chosen.fit.model
+    terms = [given if given is not None and term.label == BODY else term for term in model.terms]
+    return replace(model, terms=tuple(terms))
+
+
+def shared_estimate(
+    balances: JointBalances, found: Mapping[str, JointResult], parameter: str, shown: JointResult, own: Estimate
+) -> Estimate:  # fmt: skip
+    """A value of a link from all joints that feel it; `own` is that of the joint `shown`, whose search has found it.
+
+    Where the other joints contradict it, they do not mean the same, and the joint's own value is returned.
+    """
+    others = [
+        made
+        for joint, one in found.items()
+        if joint != shown.joint and parameter in balances.links(joint)
+        if (made := _estimate(balances, one, f"{BODY}.{parameter}")) is not None
+    ]
+    if own.std <= 0.0 or not others:
+        return own
+    weights = [std**-2 for _, std in others]
+    rest = sum(w * value for w, (value, _) in zip(weights, others, strict=True)) / sum(weights)
+    freedom = max(len(others) - 1, 1)
+    scatter = sum(w * (value - rest) ** 2 for w, (value, _) in zip(weights, others, strict=True)) / freedom
+    # the scatter between the joints widens their mean (R. T. Birge, Phys. Rev. 40 (1932) 207)
+    std = math.sqrt(max(scatter, 1.0) / sum(weights))
+    if abs(rest - own.value) > CONTRADICTS * math.hypot(std, own.std):
+        return own
+    both = own.std**-2 + std**-2
+    return replace(own, value=(own.value / own.std**2 + rest / std**2) / both, std=both**-0.5)
+
+
+def _estimate(balances: JointBalances, one: JointResult, label: str) -> tuple[float, float] | None:
+    """Value of a parameter of the body at a joint, and its standard deviation; None where the joint says nothing of it."""
+    balance = balances.balance(one.joint, one.late)
+    model = with_freed(own_path(balances, one), [label])
+    chosen = one.result.chosen
+    priors = {name: prior for name, prior in chosen.priors.items() if not name.startswith(f"{BODY}.")}
+    _, columns = linearise(balance, model, [label], chosen.fit.alignment)
+    priors[label] = Prior(model.value(label), widest(balance, columns[:, 1]))
+    fit = fit_effort(balance, model, None, priors, alignment=chosen.fit.alignment)
+    if label not in fit.names:
+        return None
+    place = 1 + fit.names.index(label)
+    std = float((fit if fit.at_limit[place] else with_robust_std(fit, balance.record)).std[place])
+    if not 0.0 < std < math.inf:
+        return None
+    return fit.model.value(label), std
+
+
+def weight_of_joints(
+    before: Mapping[str, JointResult], after: Mapping[str, JointResult], joints: Collection[str]
+) -> float:
+    """Log odds that these joints together give the searches `after` a value of the body was changed against those `before`.
+
+    A joint that frees a value of the body again speaks for another value, not for this one. So the best hypotheses of effects of
+    the joints themselves are compared, and each side also has the effects that the search on the other side has found.
+    """
+    total = 0.0
+    for joint in joints:
+        if joint not in before or joint not in after:
+            continue
+        sides = before[joint], after[joint]
+        best = [_of_effects(one) for one in sides]
+        fits = [
+            fit.linearised
+            for one, own, other in zip(sides, best, reversed(best), strict=True)
+            for fit in (own, _moved(other, one))
+        ]
+        if len({len(fit.residual) for fit in fits}) > 1:
+            continue
+        search = before[joint].result.search
+        *was, kept, new = (one.score for one in predict(fits, search.blocks, search.balance.record))
+        total += max(kept, new) - max(was)
+    return total
+
+
+def _of_effects(one: JointResult) -> Fitted:
+    """The hypothesis of a joint that predicts best among those that free no value of the body."""
+    found = [
+        fit for fit in one.result.search.hypotheses if not any(e.startswith(f"{BODY}.") for e in fit.elements)
+    ]
+    score = {h.elements: h.prediction.score for h in one.result.contest.hypotheses}
+    return max(found, key=lambda fit: score[fit.elements])
+
+
+def _moved(fitted: Fitted, one: JointResult) -> Fitted:
+    """A hypothesis about a joint, fitted again with the values of the body that another search of this joint has."""
+    nominal, balance = one.case.nominal, one.result.search.balance
+    body = nominal.term(BODY)
+    model = fitted.fit.model
+    terms = tuple(body if body is not None and term.label == BODY else term for term in model.terms)
+    inertia = replace(nominal.mass, fixed=model.mass.fixed)
+    if not model.mass.fixed:
+        inertia = replace(inertia, value=max(model.mass.value, inertia.bounds[0]))
+    names = [name for name in fitted.fit.names if name in model.parameters]
+    made = replace(model, mass=inertia, terms=terms)
+    fit = fit_effort(balance, made, names, fitted.priors, alignment=fitted.fit.alignment)
+    return Fitted.of(fitted.elements, fitted.kind, fit, fitted.priors)
