@@ -1,7 +1,6 @@
 """A value of a link that one joint finds is judged by the evidence of all joints that it moves."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np

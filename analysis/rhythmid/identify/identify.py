@@ -232,8 +232,7 @@ def _identified(
 
 @dataclass(frozen=True)
 class _Seen:
-    """Records with the nominal model, their pumping, and the results of the paper's method or the reason why it
-    gives none."""
+    """Records with the nominal model, their pumping, and the results of the paper's method or the reason for none."""
 
     records: tuple[Record, ...]
     nominal: Model
@@ -318,10 +317,8 @@ def _by_paper(seen: _Seen, htf: HtfMethod, method: Method) -> Identification:
 def _by_likelihood(
     seen: _Seen, forcing: Forcing | None, offset: Offset | None, htf: HtfMethod, tell: Tell
 ) -> Identification | None:
-    """Parameters and delays by joint maximum likelihood; HTFs without a model.
-
-    None where a cycle of unknown forcing cannot be simulated, but transfer functions around it can still be fitted.
-    """
+    """Parameters and delays by joint maximum likelihood; HTFs without a model; None where only these can be given, because a cycle of
+    unknown forcing cannot be simulated."""
     records, paper = seen.records, seen.paper
     unforced = paper and not any(pumping.active for pumping in seen.pumpings)
     tell("fitting the model to all records at once")

@@ -1,7 +1,6 @@
 """Records prepared for the time domain: continuous inputs, measured samples, and a mask of the samples to use.
 
-Block averages are compared. Far above the machine's dynamics samples contain no information. The simulation is
-averaged in the same way, which keeps the comparison unbiased.
+Block averages are compared: far above the machine's dynamics samples contain no information. The simulation is averaged in the same way.
 """
 
 import math
@@ -41,20 +40,18 @@ Mask = NDArray[np.bool_]
 class Series:
     """One record's measurement with its inputs as functions of time.
 
-    `time` (n,) [s] and `value` (n,) are the timestamps and samples of the measurement; `block` samples are averaged
-    into one. `used` (n // block,) marks the averages that are fitted, `hidden` those that are held out. Averages in
-    neither, such as gaps, are ignored. `period` [s] is the usual sample period. `ignored` (n // block, q) are
-    signals that are projected out of the averages (the limit cycle's harmonics, where the cycle is not used as
-    data). `parameters` are values of the model's parameters that the record declares; see `own_model`. `record`
-    names the record of which the series is a stretch; it is empty for a whole record. `spread` (n // block,) is the
-    standard deviation of each average's noise relative to its root mean square, where it varies: with timestamp
-    jitter it grows with the slope of the signal. `resolution` is the step to which the samples were rounded, 0
-    where they were not. `colour` is the noise model, where its spectrum is known, such as that of the effect of
-    command jitter. `zero` is the current estimate of the zero that was subtracted from the samples, relative to the
-    first record; None where the zero is that of the first record; see `record_zero`. `origin` is the unmeasured
-    start of the motion that the model integrates: for a stretch of a speed record, the displacement since the
-    record began; see `displacement`. `inputs` are command and forcing in the form of the compiled loop, created
-    automatically. `one_clock` is that of `Record`.
+    `time` (n,) [s] and `value` (n,) are the timestamps and samples of the measurement; `block` samples are averaged into one. `used` (n
+    // block,) marks the averages that are fitted, `hidden` those that are held out. Averages in neither, such as gaps, are ignored.
+    `period` [s] is the usual sample period. `ignored` (n // block, q) are signals that are projected out of the averages (the limit
+    cycle's harmonics, where the cycle is not used as data). `parameters` are values of the model's parameters that the record
+    declares; see `own_model`. `record` names the record of which the series is a stretch; it is empty for a whole record. `spread`
+    (n // block,) is the standard deviation of each average's noise relative to its root mean square, where it varies: with
+    timestamp jitter it grows with the slope of the signal. `resolution` is the step to which the samples were rounded, 0 where they
+    were not. `colour` is the noise model, where its spectrum is known, such as that of the effect of command jitter. `zero` is the
+    current estimate of the zero that was subtracted from the samples, relative to the first record; None where the zero is that of
+    the first record; see `record_zero`. `origin` is the unmeasured start of the motion that the model integrates: for a stretch of
+    a speed record, the displacement since the record began; see `displacement`. `inputs` are command and forcing in the form of the
+    compiled loop, created automatically. `one_clock` is that of `Record`.
     """
 
     name: str

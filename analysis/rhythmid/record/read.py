@@ -65,8 +65,7 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
 
     Parameters
     ----------
-    source : a bag directory, an .mcap or .db3 file, a signals.yaml that names tables, or a table, of which
-        `signals` names the columns.
+    source : a bag directory, an .mcap or .db3 file, a signals.yaml that names tables, or a table for `signals`.
     signals : mapping of the channels; by default the topics of rhythmid's own nodes.
 
     Times are relative to the first sample of any channel. A clock that started with the run (simulated time) keeps
