@@ -9,7 +9,7 @@ from rhythmid.start.start import start
 RNG = np.random.default_rng(2)
 STEP = 0.005
 TIME = STEP * np.arange(2000)
-WAVE = sum(np.sin(2 * np.pi * f * TIME + f) for f in (0.3, 0.7, 1.1, 1.9))
+WAVE = np.sum([np.sin(2 * np.pi * f * TIME + f) for f in (0.3, 0.7, 1.1, 1.9)], axis=0)
 
 
 def motion(effort: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
