@@ -11,7 +11,8 @@
 A joint's path is a `Model` whose inertia is the body's: the one that a force along the joint meets at the reference pose. Damping
 and dry friction that the file gives a joint become the elements of that name, where the path has none. `free:` under `body:`
 names inertial parameters that are estimated: `free: {shank.mass: {prior: {mean: 0.4, std: 0.04}}, shank.payload: {}, knee.armature: {}}`.
-A payload sits at the end of its link, for which `ends: {shank: [0, 0, -0.2]}` may give another place [m] in the link's frame.
+A payload sits at the end of its link, for which `ends: {shank: [0, 0, -0.2]}` may give another place [m] in the link's frame;
+`centres: {shank: [0, 0, -0.1]}` gives a link's centre of mass.
 """
 
 import os
@@ -149,6 +150,14 @@ class Machine:
             {f"{link}.{PAYLOAD}": mass}
         )
 
+    def with_centre(self, link: str, place: Array) -> "Machine":
+        """A copy whose link has its centre of mass at a place (3,) [m] of its frame. Raises InputError for a link that does not exist."""
+        body = self.body.with_centres({link: place})
+        paths = {
+            joint: _with_inertia(path, body.effective_inertia(joint)) for joint, path in self.paths.items()
+        }
+        return replace(self, body=body, paths=paths)
+
     def _inertial(self, name: str, value: float) -> Value:
         parameter = described(name)
         units = _units(self.body, name)
@@ -168,6 +177,8 @@ class Machine:
             body["hold"] = dict(self.body.hold)
         if ends := {link: self.body.ends[link].tolist() for link in self._loaded()}:
             body["ends"] = ends
+        if centres := {link: np.asarray(place).tolist() for link, place in self.body.centres.items()}:
+            body["centres"] = centres
         if self.inertial:
             body["free"] = {
                 name: entry_of(value, described(name)) | {"fixed": value.fixed}
@@ -243,6 +254,7 @@ class _Body:
     hold: list[str] | dict[str, Number] | None = None
     free: dict[str, Any] | None = None
     ends: dict[str, tuple[Number, Number, Number]] | None = None
+    centres: dict[str, tuple[Number, Number, Number]] | None = None
 
 
 _BODY: TypeAdapter[_Body] = TypeAdapter(_Body)
@@ -257,7 +269,11 @@ def _body(node: Node, folder: Path) -> tuple[MujocoBody, str]:
     try:
         hold = given.hold if isinstance(given.hold, dict) else dict.fromkeys(given.hold or (), 0.0)
         body = MujocoBody.load(folder / name, given.base, given.step, given.contacts, hold)
-        return body.with_ends({link: np.array(place) for link, place in (given.ends or {}).items()}), kind
+        ends, centres = (
+            {link: np.array(place) for link, place in (one or {}).items()}
+            for one in (given.ends, given.centres)
+        )
+        return body.with_centres(centres).with_ends(ends), kind
     except InputError as error:
         raise InputError(f"{node.at(kind).place}: {error}") from None
 

@@ -13,21 +13,34 @@ from rhythmid.diagnose.effort.candidate import widest, with_freed
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.evidence import predict
 from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import fit_effort, linearise
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.robust_covariance import with_robust_std
 from rhythmid.model import Model
 from rhythmid.value import Prior
 
-CONTRADICTS = 3.0  # standard deviations between what two joints make of a value, above which they do not mean the same
+CONTRADICTS = (
+    3.0  # standard deviations between what two joints make of a value, above which they do not mean the same
+)
 
 
 def own_path(balances: JointBalances, one: JointResult) -> Model:
-    """The path of a joint with the effects found there, and with the values of the body as they are given."""
-    given = balances.models[one.joint].term(BODY)
-    model = one.result.chosen.fit.model
-    terms = [given if given is not None and term.label == BODY else term for term in model.terms]
-    return replace(model, terms=tuple(terms))
+    """The path of a joint with the effects found there, and with the values of the body and of its rotor as they are given."""
+    model = with_body_of(balances, one.joint, one.result.chosen.fit.model)
+    return replace(model, mass=balances.models[one.joint].mass)
+
+
+def with_body_of(balances: JointBalances, joint: str, model: Model, kept: bool = False) -> Model:
+    """A path of a joint with the values of the body as they are given, or with its own `kept` and those that it lacks."""
+    given, own = balances.models[joint].term(BODY), model.term(BODY)
+    if given is None or own is None:
+        return model
+    if kept:
+        given = replace(
+            given, values={**given.values, **{n: v for n, v in own.values.items() if n in given.values}}
+        )
+    return replace(model, terms=tuple(given if term.label == BODY else term for term in model.terms))
 
 
 def shared_estimate(
@@ -43,7 +56,7 @@ def shared_estimate(
         if joint != shown.joint and parameter in balances.links(joint)
         if (made := _estimate(balances, one, f"{BODY}.{parameter}")) is not None
     ]
-    if own.std <= 0.0 or not others:
+    if not own.std or not others:
         return own
     weights = [std**-2 for _, std in others]
     rest = sum(w * value for w, (value, _) in zip(weights, others, strict=True)) / sum(weights)
@@ -89,10 +102,11 @@ def weight_of_joints(
             continue
         sides = before[joint], after[joint]
         best = [_of_effects(one) for one in sides]
+        at = [(one.case.nominal, one.result.search.balance) for one in sides]
         fits = [
             fit.linearised
-            for one, own, other in zip(sides, best, reversed(best), strict=True)
-            for fit in (own, _moved(other, one))
+            for where, own, other in zip(at, best, reversed(best), strict=True)
+            for fit in (own, _moved(other, *where))
         ]
         if len({len(fit.residual) for fit in fits}) > 1:
             continue
@@ -104,14 +118,35 @@ def weight_of_joints(
 
 def _of_effects(one: JointResult) -> Fitted:
     """The hypothesis of a joint that predicts best among those that free no value of the body."""
-    found = [fit for fit in one.result.search.hypotheses if not any(e.startswith(f"{BODY}.") for e in fit.elements)]
+    found = [
+        fit for fit in one.result.search.hypotheses if not any(e.startswith(f"{BODY}.") for e in fit.elements)
+    ]
     score = {h.elements: h.prediction.score for h in one.result.contest.hypotheses}
     return max(found, key=lambda fit: score[fit.elements])
 
 
-def _moved(fitted: Fitted, one: JointResult) -> Fitted:
-    """A hypothesis about a joint, fitted again with the values of the body that another search of this joint has."""
-    nominal, balance = one.case.nominal, one.result.search.balance
+def weight_of_values(
+    found: Mapping[str, JointResult], before: JointBalances, after: JointBalances, joints: Collection[str]
+) -> float:
+    """Log odds that these joints together give the values of the body `after` against those `before`, with the effects found at them."""
+    total = 0.0
+    for joint in joints:
+        one = found[joint]
+        fitted = _of_effects(one)
+        fits = [
+            _moved(fitted, side.models[joint], side.balance(joint, one.late)).linearised
+            for side in (before, after)
+        ]
+        if len(fits[0].residual) != len(fits[1].residual):
+            continue
+        search = one.result.search
+        was, now = predict(fits, search.blocks, search.balance.record)
+        total += now.score - was.score
+    return total
+
+
+def _moved(fitted: Fitted, nominal: Model, balance: Balance) -> Fitted:
+    """A hypothesis about a joint, fitted again with other values of the body: those of a nominal path and its balance."""
     body = nominal.term(BODY)
     model = fitted.fit.model
     terms = tuple(body if body is not None and term.label == BODY else term for term in model.terms)
