@@ -4,7 +4,7 @@ Each joint is judged with the effects that were found at that joint, because a f
 """
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from rhythmid.body.body import BODY
@@ -13,6 +13,7 @@ from rhythmid.diagnose.effort.candidate import widest, with_freed
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.evidence import predict
 from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import fit_effort, linearise
 from rhythmid.identify.joints.joint_motion import JointBalances
@@ -32,15 +33,20 @@ def own_path(balances: JointBalances, one: JointResult) -> Model:
 
 
 def with_body_of(balances: JointBalances, joint: str, model: Model, kept: bool = False) -> Model:
-    """A path of a joint with the values of the body as they are given, or with its own `kept` and those that it lacks."""
-    given, own = balances.models[joint].term(BODY), model.term(BODY)
+    """A path of a joint with the values of the body as they are given, or with its own `kept` and those that it lacks.
+
+    Its inertia is that which the balance has subtracted from what the body asks for; it stays free where it is.
+    """
+    nominal = balances.models[joint]
+    inertia = replace(nominal.mass, fixed=model.mass.fixed)
+    given, own = nominal.term(BODY), model.term(BODY)
     if given is None or own is None:
-        return model
+        return replace(model, mass=inertia)
     if kept:
-        given = replace(
-            given, values={**given.values, **{n: v for n, v in own.values.items() if n in given.values}}
-        )
-    return replace(model, terms=tuple(given if term.label == BODY else term for term in model.terms))
+        known = {name: value for name, value in own.values.items() if name in given.values}
+        given = replace(given, values={**given.values, **known})
+    terms = tuple(given if term.label == BODY else term for term in model.terms)
+    return replace(model, mass=inertia, terms=terms)
 
 
 def shared_estimate(
@@ -98,21 +104,11 @@ def weight_of_joints(
     """
     total = 0.0
     for joint in joints:
-        if joint not in before or joint not in after:
-            continue
-        sides = before[joint], after[joint]
-        best = [_of_effects(one) for one in sides]
-        at = [(one.case.nominal, one.result.search.balance) for one in sides]
-        fits = [
-            fit.linearised
-            for where, own, other in zip(at, best, reversed(best), strict=True)
-            for fit in (own, _moved(other, *where))
-        ]
-        if len({len(fit.residual) for fit in fits}) > 1:
-            continue
-        search = before[joint].result.search
-        *was, kept, new = (one.score for one in predict(fits, search.blocks, search.balance.record))
-        total += max(kept, new) - max(was)
+        if joint in before and joint in after:
+            sides = before[joint], after[joint]
+            hypotheses = [fit for one in sides for fit in (one.result.nominal, _of_effects(one))]
+            at = [(one.case.nominal, one.result.search.balance) for one in sides]
+            total += _gain(before[joint], hypotheses, *at)
     return total
 
 
@@ -132,17 +128,37 @@ def weight_of_values(
     total = 0.0
     for joint in joints:
         one = found[joint]
-        fitted = _of_effects(one)
-        fits = [
-            _moved(fitted, side.models[joint], side.balance(joint, one.late)).linearised
-            for side in (before, after)
-        ]
-        if len(fits[0].residual) != len(fits[1].residual):
-            continue
-        search = one.result.search
-        was, now = predict(fits, search.blocks, search.balance.record)
-        total += now.score - was.score
+        hypotheses = [one.result.nominal, _of_effects(one)]
+        total += _gain(
+            one,
+            hypotheses,
+            *((side.models[joint], side.balance(joint, one.late)) for side in (before, after)),
+        )
     return total
+
+
+def _gain(
+    one: JointResult,
+    hypotheses: Sequence[Fitted],
+    before: tuple[Model, Balance],
+    after: tuple[Model, Balance],
+) -> float:
+    """Log odds of a joint for the values of the body `after` against those `before`, each a nominal path and its balance.
+
+    Each side has the best of these hypotheses, of which an effect costs what any addition has to gain in a search: a value of a link
+    that needs another effect at a joint beside it explains less than one that needs none.
+    """
+    fits = [_moved(fitted, *side).linearised for side in (before, after) for fitted in hypotheses]
+    if len({len(fit.residual) for fit in fits}) > 1:
+        return 0.0
+    price = decisive(one.result.contest.candidates)
+    search = one.result.search
+    scores = [each.score for each in predict(fits, search.blocks, search.balance.record)]
+    net = [
+        score - price * len(fitted.elements)
+        for score, fitted in zip(scores, [*hypotheses, *hypotheses], strict=True)
+    ]
+    return max(net[len(hypotheses) :]) - max(net[: len(hypotheses)])
 
 
 def _moved(fitted: Fitted, nominal: Model, balance: Balance) -> Fitted:
