@@ -8,9 +8,15 @@ import pytest
 from legged import TWO_LINKS, recorded, references
 
 from rhythmid.body.machine import Machine
+from rhythmid.diagnose.case import Budget
+from rhythmid.diagnose.effort.candidate import fixed_values
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
+from rhythmid.diagnose.joints.joint_case import diagnose_joint
 from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
-from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.diagnose.joints.link_evidence import weight_of_values
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
+from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.record.joint_record import JointRecord
 
 PATH = (
     "{command: [{input_delay: {delay: 0.0}}, {position_control: {proportional: {value: 80, fixed: true}, "
@@ -31,31 +37,61 @@ def arm(tmp_path: Path) -> Callable[[str], Machine]:
     return made
 
 
-def diagnosed(plant: Machine, nominal: Machine) -> MachineDiagnosis:
+def run(plant: Machine) -> JointRecord:
     time, rng = np.arange(0.0, 6.0, 0.002), np.random.default_rng(4)
-    asked = references({"one": (0.5, 0.4), "two": (0.7, 0.4)}, time, rng, (0.3, 2.0))
-    return diagnose_machine([recorded(plant, asked, time, rng)], nominal).diagnosis
+    return recorded(
+        plant, references({"one": (0.5, 0.4), "two": (0.7, 0.4)}, time, rng, (0.3, 2.0)), time, rng
+    )
 
 
-def test_a_mass_that_the_joint_above_refutes_is_not_named(arm):
+def diagnosed(plant: Machine, nominal: Machine) -> MachineDiagnosis:
+    return diagnose_machine([run(plant)], nominal).diagnosis
+
+
+def test_a_wrong_centre_of_mass_is_named_and_not_a_mass_or_a_payload(arm: Callable[[str], Machine]):
     found = diagnosed(arm(FARTHER), arm(CENTRE))
-    print(found.summary, found.missing, found.notes)
-    masses = [
-        one for one in found.missing if one.element in ("link_mass", "payload") and one.probability > 0.8
-    ]
-    assert not masses
+    first = found.missing[0]
+    assert (first.element, first.link, first.joint) == ("link_centre_of_mass", "lower", "two")
+    assert first.parameters["z"].value == pytest.approx(-0.23, abs=0.003)
+    assert [one.element for one in found.missing if one.link] == ["link_centre_of_mass"]
+    assert "the centre of mass of lower" in found.summary
+    assert any(
+        "lower.centre_of_mass: (0, 0.02, -0.15) m in the nominal model" in note for note in found.notes
+    )
 
 
-def test_a_mass_is_found_with_its_value_though_the_joint_above_has_a_friction(arm):
+def test_a_mass_is_found_with_its_value_though_the_joint_above_has_a_friction(arm: Callable[[str], Machine]):
     nominal = arm(CENTRE)
     heavier = nominal.with_inertial({"lower.mass": 1.4}).with_element(
         "one", load_catalogue()["coulomb_friction"], {"force": 0.5, "transition": 0.03}
     )
     found = diagnosed(heavier, nominal)
-    print(found.summary, found.missing, found.notes)
-    assert {(one.joint, one.element) for one in found.missing} == {
-        ("two", "link_mass"),
-        ("one", "coulomb_friction"),
+    (mass,) = [one for one in found.missing if one.link]
+    assert (mass.element, mass.link) == ("link_mass", "lower")
+    assert mass.parameters["mass"].value == pytest.approx(1.4, abs=0.01)
+
+
+def test_joints_together_refute_a_mass_where_the_centre_is_wrong(arm: Callable[[str], Machine]):
+    plant, nominal = arm(FARTHER), arm(CENTRE)
+    record = run(plant)
+    balances = JointBalances.of(nominal, [record])
+    wrong = JointBalances.of(nominal.with_inertial({"lower.mass": 1.53}), [record], balances)
+    right = JointBalances.of(nominal.with_centre("lower", np.array([0.0, 0.02, -0.23])), [record], balances)
+    catalogue = Catalogue({"viscous_damper": load_catalogue()["viscous_damper"]})
+    found = {
+        joint: diagnose_joint(balances, None, joint, catalogue, lambda _: None, Budget())
+        for joint in nominal.joints
     }
-    (mass,) = [one for one in found.missing if one.element == "link_mass"]
-    assert mass.parameters["mass"].value == pytest.approx(1.4, abs=0.05)
+    assert weight_of_values(found, balances, right, ["one", "two"]) > 20.0
+    assert weight_of_values(found, wrong, right, ["one", "two"]) > 20.0
+
+
+def test_a_value_that_the_joints_refute_is_no_candidate_where_it_was_found(arm: Callable[[str], Machine]):
+    nominal = arm(CENTRE)
+    record = run(nominal)
+    balances = JointBalances.of(nominal, [record])
+    without = JointBalances.of(nominal, [record], balances.without("two", "lower.mass"))
+    for joint, expected in (("one", True), ("two", False)):
+        names = fixed_values(without.balance(joint), without.models[joint])
+        assert ("body.lower.mass" in names) is expected
+        assert "lower.mass" in without.links(joint)  # it is still judged there

@@ -4,6 +4,7 @@ rotor."""
 from rhythmid.elements.element import Parameter
 
 MASS, TURNING, PAYLOAD, ARMATURE = "mass", "inertia", "payload", "armature"
+CENTRE = "centre_of_mass"  # a place (3,), no parameter of one number
 MEANING = {
     MASS: "mass of the link, shape kept",
     TURNING: "inertia of the link about the axis through its centre of mass along that of its joint, shape kept",

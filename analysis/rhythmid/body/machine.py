@@ -12,7 +12,7 @@ A joint's path is a `Model` with the body's inertia: the effective inertia of th
 Damping and dry friction of a joint in the file become the elements of that name, where the path has none. `free:`
 under `body:` names the inertial parameters to estimate: `free: {shank.mass: {prior: {mean: 0.4, std: 0.04}},
 shank.payload: {}, knee.armature: {}}`. A payload is at the end of its link; `ends: {shank: [0, 0, -0.2]}` gives
-another position [m] in the link's frame.
+another position [m] in the link's frame; `centres: {shank: [0, 0, -0.1]}` gives a link's centre of mass.
 `inertials: {shank: {mass: 0.3, centre: [0, 0, -0.1], inertia: [xx, yy, zz, xy, xz, yz]}}` replaces the inertia of a link in the file, about the centre of mass.
 `gravity: [9.81, 0, 0]` [m/s^2] under `body:` is gravity in the world frame of the file, for a base that is mounted otherwise than the file says.
 """
@@ -163,6 +163,14 @@ class Machine:
         }
         return replace(self, body=body, paths=paths)
 
+    def with_centre(self, link: str, place: Array) -> "Machine":
+        """A copy whose link has its centre of mass at a place (3,) [m] of its frame. Raises InputError for a link that does not exist."""
+        body = self.body.with_centres({link: place})
+        paths = {
+            joint: _with_inertia(path, body.effective_inertia(joint)) for joint, path in self.paths.items()
+        }
+        return replace(self, body=body, paths=paths)
+
     def _inertial(self, name: str, value: float) -> Value:
         parameter = described(name)
         units = _units(self.body, name)
@@ -186,6 +194,8 @@ class Machine:
             body["inertials"] = {link: _written(ten) for link, ten in self.body.replaced.items()}
         if ends := {link: self.body.ends[link].tolist() for link in self._loaded()}:
             body["ends"] = ends
+        if centres := {link: np.asarray(place).tolist() for link, place in self.body.centres.items()}:
+            body["centres"] = centres
         if self.inertial:
             body["free"] = {
                 name: entry_of(value, described(name)) | {"fixed": value.fixed}
@@ -286,6 +296,7 @@ class _Body:
     ends: dict[str, tuple[Number, Number, Number]] | None = None
     inertials: dict[str, _Inertial] | None = None
     gravity: tuple[Gravity, Gravity, Gravity] | None = None
+    centres: dict[str, tuple[Number, Number, Number]] | None = None
 
 
 _BODY: TypeAdapter[_Body] = TypeAdapter(_Body)
@@ -302,7 +313,11 @@ def _body(node: Node, folder: Path) -> tuple[MujocoBody, str]:
         body = MujocoBody.load(folder / name, given.base, given.step, given.contacts, hold)
         body = body if given.gravity is None else body.with_gravity(given.gravity)
         body = body.with_inertials({link: one.ten for link, one in (given.inertials or {}).items()})
-        return body.with_ends({link: np.array(place) for link, place in (given.ends or {}).items()}), kind
+        ends, centres = (
+            {link: np.array(place) for link, place in (one or {}).items()}
+            for one in (given.ends, given.centres)
+        )
+        return body.with_centres(centres).with_ends(ends), kind
     except InputError as error:
         raise InputError(f"{node.at(kind).place}: {error}") from None
 

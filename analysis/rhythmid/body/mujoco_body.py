@@ -48,6 +48,7 @@ class MujocoBody(Body):
     ends: Mapping[str, Array] = field(
         default_factory=dict
     )  # for links that may carry a payload, its position (3,) in their frames
+    centres: Mapping[str, Array] = field(default_factory=dict)  # (3,) of links, where they are not the file's
     notes: tuple[str, ...] = ()  # parts of the file that were left out or changed, in words
     hold: Mapping[str, float] = field(default_factory=dict)  # positions of the file's joints that are fixed
     replaced: Mapping[str, Array] = field(
@@ -246,6 +247,22 @@ class MujocoBody(Body):
             if name not in {f"{one}.{TURNING}" for one in values}
         }
         return replace(self, model=model, given=given, replaced={**self.replaced, **values})
+
+    def with_centres(self, places: Mapping[str, Array]) -> "MujocoBody":
+        """A copy in which the centres of mass of links, without their payloads, are at these places (3,) in their frames. Mass and inertia
+        about the centre stay. Raises InputError for a link that does not exist."""
+        mj, model = mujoco(), copy.copy(self.model)
+        for link, place in places.items():
+            if link not in self.links:
+                raise InputError(
+                    f"{self.path}: has no link {link!r} that moves; it has {', '.join(self.links)}"
+                )
+            own = replace(self.own(link), centre=np.asarray(place, dtype=float))
+            if payload := self._payload(link):
+                own = Principal.from_ten(own.ten + payload * point_mass(self.ends[link]))
+            own.put_into(model, self.links[link])
+        mj.mj_setConst(model, quiet_data(model))
+        return replace(self, model=model, centres={**self.centres, **places})
 
     def _payload(self, link: str) -> float:
         return self.given.get(f"{link}.{PAYLOAD}", 0.0)

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from rhythmid.body.embedded import NAME, text_of
 from rhythmid.body.inertial_parameter import MASS, PAYLOAD
-from rhythmid.body.link_inertia import Principal, about_centre
+from rhythmid.body.link_inertia import Principal, about_centre, point_mass
 from rhythmid.body.live_source import generate_live, numbers_of, rows_of
 from rhythmid.body.machine import Machine
 from rhythmid.body.mujoco_body import MujocoBody
@@ -244,15 +244,19 @@ def _replace(link: tree.Element, own: Principal | None) -> None:
 
 
 def _add_inertia(link: tree.Element, ten: Array) -> None:
-    """Add the moments of inertia in ten parameters (10,) to a link of a URDF, which includes the inertia of
-    everything fixed to it."""
+    """Add the first moment and the moments of inertia among ten parameters (10,) to a link of a URDF, which includes the
+    inertia of everything fixed to it. Its mass stays."""
     inertial = _section(link, "inertial")
-    inertia, origin = _section(inertial, "inertia"), inertial.find("origin")
-    _section(inertial, "mass").attrib.setdefault("value", "0")
-    turn = [0.0] * 3 if origin is None else [float(one) for one in origin.get("rpy", "0 0 0").split()]
+    inertia, origin = _section(inertial, "inertia"), _section(inertial, "origin")
+    mass = float(_section(inertial, "mass").attrib.setdefault("value", "0"))
+    centre, turn = (
+        np.array([float(one) for one in origin.get(key, "0 0 0").split()]) for key in ("xyz", "rpy")
+    )
+    moved = centre + ten[1:4] / mass if np.any(ten[1:4]) else centre
     axes = Rotation.from_euler("xyz", turn).as_matrix()
-    xx, yy, zz, xy, xz, yz = ten[4:]
+    xx, yy, zz, xy, xz, yz = ten[4:] + mass * (point_mass(centre) - point_mass(moved))[4:]
     more = axes.T @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ axes
+    origin.set("xyz", " ".join(repr(float(one)) for one in moved))
     for (row, first), (column, second) in combinations_with_replacement(enumerate("xyz"), 2):
         key = f"i{first}{second}"
         inertia.set(key, repr(float(inertia.get(key, "0")) + float(more[row, column])))

@@ -16,7 +16,7 @@ from rhythmid.identify.joints.reference_delay import ReferenceDelay
 class JointEffect:
     """An effect that the nominal model lacks at a joint.
 
-    For a link's mass, inertia or payload, `link` names the link, and the joint is the one that moves it. `share` is relative to
+    For a link's mass, inertia, centre of mass or payload, `link` names the link, and the joint is the one that moves it. `share` is relative to
     the joint's mismatch. `heldout_gain` is the reduction of the joint's error on data that no fit has seen, as a share of the
     effort.
     """
@@ -34,7 +34,7 @@ class JointEffect:
     @property
     def of_link(self) -> str:
         """The wrong quantity of a link in words; empty where the effect acts at the joint."""
-        kind = self.element.removeprefix("link_")
+        kind = self.element.removeprefix("link_").replace("_", " ")
         return f"{kind} of {self.link}" if self.link else ""
 
 

@@ -3,13 +3,14 @@
 from collections.abc import Mapping, Sequence
 
 from rhythmid.body.body import BODY
+from rhythmid.body.inertial_parameter import split
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
 from rhythmid.diagnose.constants import BLIND, STATED
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.joints.equivalents import shared_among
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
-from rhythmid.diagnose.joints.joint_case import JointResult, name_of
+from rhythmid.diagnose.joints.joint_case import OF_LINKS, JointResult, name_of
 from rhythmid.diagnose.joints.misfit import error_of
 from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.places import SENTENCES
@@ -23,6 +24,7 @@ EQUATIONS = {  # for quantities that are not elements: slot, meaning, and the na
     "armature": ("body", "M_jj → M_jj + ΔI", "inertia_error"),
     "link_mass": ("body", "m → m′, shape kept", "mass"),
     "link_inertia": ("body", "J → J′ about the centre of mass, along the joint's axis", "inertia"),
+    "link_centre_of_mass": ("body", "c → c′, mass and inertia about the centre kept", "x, y, z"),
     "payload": ("body", "point mass m at the end of the link", "mass"),
     "actuator_delay": ("actuator", "f(t) → f(t − τ)", "delay"),
     "input_delay": ("command", "r(t) → r(t − τ)", "delay"),
@@ -79,7 +81,8 @@ def compose_machine(
             for joint, one in answers.items()
             if joint in named or joint in undecided
             for group in one.indistinguishable
-        ),
+        )
+        + tuple(_alike_of(machine, one) for one in links.values() if one.alike),
         fit={joint: {str(k): v for k, v in one.fit.items()} for joint, one in answers.items()},
         parameters={
             f"{joint}.{name}": value
@@ -142,14 +145,21 @@ def _gain(one: JointResult) -> float:
 
 def _link(machine: Machine, wrong: WrongLink) -> JointEffect:
     """A link's mass, inertia or payload, with the evidence of the joint that shows it best."""
-    one, label = wrong.shown, f"{BODY}.{wrong.parameter}"
+    one, label = wrong.shown, wrong.label
     decision = one.result.decision
-    element, name = name_of(one.joint, label)
+    name, kind = split(wrong.parameter)
+    element = OF_LINKS[kind]
     slot, equation, _ = EQUATIONS[element]
     return JointEffect(
-        machine.body.joint_of(name), element, slot, equation, decision.shares[label], decision.probability[label],
-        dict(wrong.values), _gain(one), name,
+        machine.body.joint_of(name), element, slot, equation, decision.shares[label],
+        decision.probability[label] / (1 + len(wrong.alike)), dict(wrong.values), _gain(one), name,
     )  # fmt: skip
+
+
+def _alike_of(machine: Machine, wrong: WrongLink) -> tuple[str, ...]:
+    """The quantities of a link that explain the records as well as one another."""
+    link, kind = split(wrong.parameter)
+    return tuple(f"{machine.body.joint_of(link)}: {name}" for name in (OF_LINKS[kind], *wrong.alike))
 
 
 def summary_of_joints(

@@ -22,6 +22,7 @@ from rhythmid.diagnose.joints.equivalents import equivalent_names, equivalents
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
+from rhythmid.diagnose.joints.link_centre import feels
 from rhythmid.diagnose.joints.link_evidence import weight_of_joints
 from rhythmid.diagnose.joints.misfit import misfits
 from rhythmid.diagnose.joints.stated_fit import stated_fit
@@ -178,7 +179,8 @@ def _explained(
         wrong = wrong_link(balances, records, found, link, result)
         tried = wrong.put_right(machine)
         changed = JointBalances.of(tried, records, balances)
-        again = [joint for joint in machine.joints if link in changed.links(joint)]
+        owner, _ = split(link)
+        again = [joint for joint in machine.joints if feels(changed, joint, owner)]
         unseen = JointBalances.of(tried, holdout, changed) if holdout else None
         late = reference_delay(changed, changed.computed) if changed.computed else None
         better, refused_now = _searched(changed, unseen, again, catalogue, tell, budget, late)
@@ -188,7 +190,7 @@ def _explained(
             unseen = JointBalances.of(machine, holdout, balances) if holdout else None
             better, refused_now = _searched(balances, unseen, [result.joint], catalogue, tell, budget, delay)
         else:
-            links[link] = wrong
+            links[wrong.parameter] = wrong
             machine, balances, delay = tried, changed, late
         found, refused = {**found, **better}, {**refused, **refused_now}
     return _Explained(machine, found, refused, links, balances.leads, delay)

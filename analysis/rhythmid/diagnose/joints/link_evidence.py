@@ -4,7 +4,7 @@ Each joint is judged with the effects that were found at that joint, because a f
 """
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from rhythmid.body.body import BODY
@@ -13,6 +13,8 @@ from rhythmid.diagnose.effort.candidate import widest, with_freed
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.evidence import predict
 from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.diagnose.rejections import decisive
+from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import fit_effort, linearise
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.robust_covariance import with_robust_std
@@ -25,11 +27,26 @@ CONTRADICTS = (
 
 
 def own_path(balances: JointBalances, one: JointResult) -> Model:
-    """The path of a joint with the effects found there, and with the values of the body as they are given."""
-    given = balances.models[one.joint].term(BODY)
-    model = one.result.chosen.fit.model
-    terms = [given if given is not None and term.label == BODY else term for term in model.terms]
-    return replace(model, terms=tuple(terms))
+    """The path of a joint with the effects found there, and with the values of the body and of its rotor as they are given."""
+    model = with_body_of(balances, one.joint, one.result.chosen.fit.model)
+    return replace(model, mass=balances.models[one.joint].mass)
+
+
+def with_body_of(balances: JointBalances, joint: str, model: Model, kept: bool = False) -> Model:
+    """A path of a joint with the values of the body as they are given, or with its own `kept` and those that it lacks.
+
+    Its inertia is that which the balance has subtracted from what the body asks for; it stays free where it is.
+    """
+    nominal = balances.models[joint]
+    inertia = replace(nominal.mass, fixed=model.mass.fixed)
+    given, own = nominal.term(BODY), model.term(BODY)
+    if given is None or own is None:
+        return replace(model, mass=inertia)
+    if kept:
+        known = {name: value for name, value in own.values.items() if name in given.values}
+        given = replace(given, values={**given.values, **known})
+    terms = tuple(given if term.label == BODY else term for term in model.terms)
+    return replace(model, mass=inertia, terms=terms)
 
 
 def shared_estimate(
@@ -45,7 +62,7 @@ def shared_estimate(
         if joint != shown.joint and parameter in balances.links(joint)
         if (made := _estimate(balances, one, f"{BODY}.{parameter}")) is not None
     ]
-    if own.std <= 0.0 or not others:
+    if not own.std or not others:
         return own
     weights = [std**-2 for _, std in others]
     rest = sum(w * value for w, (value, _) in zip(weights, others, strict=True)) / sum(weights)
@@ -87,20 +104,11 @@ def weight_of_joints(
     """
     total = 0.0
     for joint in joints:
-        if joint not in before or joint not in after:
-            continue
-        sides = before[joint], after[joint]
-        best = [_of_effects(one) for one in sides]
-        fits = [
-            fit.linearised
-            for one, own, other in zip(sides, best, reversed(best), strict=True)
-            for fit in (own, _moved(other, one))
-        ]
-        if len({len(fit.residual) for fit in fits}) > 1:
-            continue
-        search = before[joint].result.search
-        *was, kept, new = (one.score for one in predict(fits, search.blocks, search.balance.record))
-        total += max(kept, new) - max(was)
+        if joint in before and joint in after:
+            sides = before[joint], after[joint]
+            hypotheses = [fit for one in sides for fit in (one.result.nominal, _of_effects(one))]
+            at = [(one.case.nominal, one.result.search.balance) for one in sides]
+            total += _gain(before[joint], hypotheses, *at)
     return total
 
 
@@ -113,9 +121,48 @@ def _of_effects(one: JointResult) -> Fitted:
     return max(found, key=lambda fit: score[fit.elements])
 
 
-def _moved(fitted: Fitted, one: JointResult) -> Fitted:
-    """A hypothesis about a joint, fitted again with the values of the body that another search of this joint has."""
-    nominal, balance = one.case.nominal, one.result.search.balance
+def weight_of_values(
+    found: Mapping[str, JointResult], before: JointBalances, after: JointBalances, joints: Collection[str]
+) -> float:
+    """Log odds that these joints together give the values of the body `after` against those `before`, with the effects found at them."""
+    total = 0.0
+    for joint in joints:
+        one = found[joint]
+        hypotheses = [one.result.nominal, _of_effects(one)]
+        total += _gain(
+            one,
+            hypotheses,
+            *((side.models[joint], side.balance(joint, one.late)) for side in (before, after)),
+        )
+    return total
+
+
+def _gain(
+    one: JointResult,
+    hypotheses: Sequence[Fitted],
+    before: tuple[Model, Balance],
+    after: tuple[Model, Balance],
+) -> float:
+    """Log odds of a joint for the values of the body `after` against those `before`, each a nominal path and its balance.
+
+    Each side has the best of these hypotheses, of which an effect costs what any addition has to gain in a search: a value of a link
+    that needs another effect at a joint beside it explains less than one that needs none.
+    """
+    fits = [_moved(fitted, *side).linearised for side in (before, after) for fitted in hypotheses]
+    if len({len(fit.residual) for fit in fits}) > 1:
+        return 0.0
+    price = decisive(one.result.contest.candidates)
+    search = one.result.search
+    scores = [each.score for each in predict(fits, search.blocks, search.balance.record)]
+    net = [
+        score - price * len(fitted.elements)
+        for score, fitted in zip(scores, [*hypotheses, *hypotheses], strict=True)
+    ]
+    return max(net[len(hypotheses) :]) - max(net[: len(hypotheses)])
+
+
+def _moved(fitted: Fitted, nominal: Model, balance: Balance) -> Fitted:
+    """A hypothesis about a joint, fitted again with other values of the body: those of a nominal path and its balance."""
     body = nominal.term(BODY)
     model = fitted.fit.model
     terms = tuple(body if body is not None and term.label == BODY else term for term in model.terms)

@@ -16,7 +16,8 @@ from rhythmid.body.body import BODY
 from rhythmid.body.inertial_parameter import PAYLOAD
 from rhythmid.body.link_inertia import point_mass
 from rhythmid.diagnose.joints.joint_case import JointResult
-from rhythmid.diagnose.joints.link_evidence import own_path
+from rhythmid.diagnose.joints.link_evidence import own_path, weight_of_values, with_body_of
+from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.inverse_dynamics.estimate import fit_effort
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.least_squares import orthonormal
@@ -40,7 +41,7 @@ class PlacedPayload:
 
 
 @dataclass(frozen=True, eq=False)
-class _Rows:
+class Rows:
     """The data of one joint: residual (n,), columns (n, 10) of the link's inertia, columns (n, p) of the other parameters."""
 
     residual: Array
@@ -58,28 +59,57 @@ def placed_payload(
 ) -> PlacedPayload:
     """Mass and place of the payload of a link; `shown_at` is the joint whose search found it.
 
-    That joint keeps its chosen path, the others the effects found there; all paths are refitted together with the payload.
+    All paths are refitted together with the payload. Effects and values that were found may only have stood for the payload. So the
+    paths are the given ones; at the joint `shown_at` what was found, and at the others, too, where this has decisively more evidence.
     """
-    machine, parameter = balances.machine, f"{link}.{PAYLOAD}"
-    end, chosen = machine.body.ends[link], found[shown_at].result.chosen.model
-    value = np.concatenate([[chosen.value(f"{BODY}.{parameter}")], end])
-    std = np.zeros(4)
+    given = {joint: balances.models[joint] for joint in found}
+    effects = {joint: own_path(balances, one) for joint, one in found.items()}
+    chosen = found[shown_at].result.chosen.model
+    start = chosen.value(f"{BODY}.{link}.{PAYLOAD}")
+    made = [
+        _fitted(balances, records, found, link, shown_at, paths, start)
+        for paths in (given, {**given, shown_at: chosen}, {**effects, shown_at: chosen})
+    ]
+    best, evidence = made[0]
+    for richer, more in made[1:]:
+        if more > evidence + decisive(1):
+            best, evidence = richer, more
+    return best
+
+
+def _fitted(
+    balances: JointBalances,
+    records: Sequence[JointRecord],
+    found: Mapping[str, JointResult],
+    link: str,
+    shown_at: str,
+    paths: Mapping[str, Model],
+    start: float,
+) -> tuple[PlacedPayload, float]:
+    """The payload fitted beside these paths from a `start` [kg], and the log odds that all joints give it."""
+    machine, label = balances.machine, f"{BODY}.{link}.{PAYLOAD}"
+    end = machine.body.ends[link]
+    value, std = np.concatenate([[start], end]), np.zeros(4)
+
+    def carried() -> JointBalances:
+        return JointBalances.of(machine.with_payload(link, float(value[0]), value[1:]), records, balances)
+
+    now = carried()
     for _ in range(ROUNDS):
-        now = JointBalances.of(machine.with_payload(link, float(value[0]), value[1:]), records, balances)
         rows = []
-        for joint in (one for one in found if parameter in now.links(one)):
-            model = chosen if joint == shown_at else own_path(now, found[joint])
-            held = model.with_parameters(
-                {f"{BODY}.{parameter}": now.models[joint].parameters[f"{BODY}.{parameter}"]}
-            )
-            rows.append(_rows(now, joint, held, found[joint].late, link))
+        for joint in (one for one in found if f"{link}.{PAYLOAD}" in now.links(one)):
+            model = with_body_of(now, joint, paths[joint], kept=joint == shown_at)
+            held = model.with_parameters({label: now.models[joint].parameters[label]})
+            rows.append(rows_of(now, joint, held, found[joint].late, link))
         value, std = _refined(rows, value, end)
-    return PlacedPayload(float(value[0]), float(std[0]), value[1:], std[1:])
+        now = carried()
+    payload = PlacedPayload(float(value[0]), float(std[0]), value[1:], std[1:])
+    return payload, weight_of_values(found, balances, now, list(found))
 
 
-def _refined(rows: Sequence[_Rows], value: Array, end: Array) -> tuple[Array, Array]:
+def _refined(rows: Sequence[Rows], value: Array, end: Array) -> tuple[Array, Array]:
     """Improved mass and place (4,) from a start `value`, and their standard deviations."""
-    weighted = [_weighted(one) for one in rows]
+    weighted = [weighted_rows(one) for one in rows]
     before = value[0] * point_mass(value[1:])
 
     def error(at: Array) -> Array:
@@ -93,17 +123,18 @@ def _refined(rows: Sequence[_Rows], value: Array, end: Array) -> tuple[Array, Ar
     return solved.x, np.sqrt(np.diag(np.linalg.pinv(solved.jac.T @ solved.jac)))
 
 
-def _rows(balances: JointBalances, joint: str, model: Model, late: float, link: str) -> _Rows:
+def rows_of(balances: JointBalances, joint: str, model: Model, late: float, link: str) -> Rows:
+    """The data of a joint with its path fitted, and the columns of a link."""
     body = balances.machine.body
     own = body.joints[joint].velocity
     balance = balances.balance(joint, late)
     fit = fit_effort(balance, model)
     made = [body.inertial_columns(link, b.pose, b.rate, b.acceleration)[:, own] for b in balances.bodies]
     columns = balance.rows(made, balance.later(fit.model, fit.alignment))
-    return _Rows(fit.residual, columns, fit.jacobian, balance.record)
+    return Rows(fit.residual, columns, fit.jacobian, balance.record)
 
 
-def _weighted(one: _Rows) -> tuple[Array, Array]:
+def weighted_rows(one: Rows) -> tuple[Array, Array]:
     """Residual and columns of a joint in units of its noise, with the joint's other parameters projected out."""
     scale = scale_of(one.residual)
     lasts = autocorrelation_time(one.residual, one.record)

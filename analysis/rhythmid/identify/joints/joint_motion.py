@@ -106,7 +106,7 @@ class JointBalances:
         """The balances of these records, with the filters of `alike` and without the same leads. Raises InputError
         where the records are too short.
 
-        The forces at each joint are those of `alike`, too, unless payloads are at other places.
+        The forces at each joint are those of `alike`, too, unless payloads or centres of mass are at other places.
         """
         stretches = joint_stretches(machine, records)
         cut, dominant = (alike.cut, alike.dominant) if alike else _cut(machine, stretches)
@@ -272,9 +272,15 @@ def _body_motion(machine: Machine, stretch: JointStretch, cut: float) -> BodyMot
 
 
 def _same_places(one: Machine, other: Machine) -> bool:
-    """Whether the payloads of two machines sit at the same places of their links."""
-    ends = one.body.ends, other.body.ends
-    return ends[0].keys() == ends[1].keys() and all(np.array_equal(ends[0][n], ends[1][n]) for n in ends[0])
+    """Whether the payloads and the centres of mass of two machines are at the same places of their links."""
+    places = (
+        (one.body.ends, other.body.ends),
+        (one.body.centres, other.body.centres),
+    )
+    return all(
+        first.keys() == second.keys() and all(np.array_equal(first[link], second[link]) for link in first)
+        for first, second in places
+    )
 
 
 def _links(
