@@ -59,5 +59,5 @@ def test_a_centre_is_in_the_files_that_are_written(tmp_path: Path, suffix: str):
 
 
 def test_a_centre_of_a_link_that_does_not_exist_is_refused(tmp_path: Path):
-    with pytest.raises(InputError, match=r"two.yaml.*has no link 'hand' that moves; it has upper, lower"):
+    with pytest.raises(InputError, match=r"two.yaml.*has no link 'hand' that moves; those are upper, lower"):
         loaded(tmp_path, ", centres: {hand: [0, 0, 1]}")

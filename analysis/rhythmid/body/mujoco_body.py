@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.body.body import Array, Body, Joint, Passive
+from rhythmid.body.compiled_joints import joints_of, passive_of
 from rhythmid.body.inertial_parameter import ARMATURE, MASS, PAYLOAD, TURNING, split
 from rhythmid.body.link_inertia import Hinge, Principal, end_links, hinges, point_mass
 from rhythmid.body.robot_file import (
@@ -77,7 +78,7 @@ class MujocoBody(Body):
                 model = robot.spec.compile()
             except (ValueError, mj.FatalError) as error:
                 raise refused(path, error) from None
-        joints, passive = _joints(model, path), _passive(model)
+        joints, passive = joints_of(model, path), passive_of(model)
         if base not in (FIXED, FREE, *joints):
             raise InputError(f"{path}: base: {base!r} is neither fixed, free nor a joint; {_listed(joints)}")
         if base == FREE and model.nq == model.nv:
@@ -181,33 +182,27 @@ class MujocoBody(Body):
         return masses | turning | payloads | armatures
 
     def with_parameters(self, values: Mapping[str, float]) -> "MujocoBody":
-        mj, model = mujoco(), copy.copy(self.model)
-        known = self.parameters
-        changed = {}
+        known, armatures, changed = self.parameters, {}, {}
         for name, value in values.items():
             if name not in known:
                 raise InputError(f"{self.path}: has no parameter {name!r}; it has {', '.join(known)}")
             owner, kind = split(name)
             if kind == ARMATURE:
-                model.dof_armature[self.joints[owner].velocity] = value
+                armatures[self.joints[owner].velocity] = value
             elif kind == MASS and not 0.0 < value < HEAVIEST:
                 raise InputError(f"the mass of link {owner!r} must be greater than 0, not {value:g}")
             elif not 0.0 <= value < HEAVIEST:
                 raise InputError(f"the {kind} of link {owner!r} must be 0 or greater, not {value:g}")
             else:
-                changed[owner] = self.own(owner), self._payload(owner)
+                changed[owner] = self.own(owner)
         given = {**self.given, **values}
-        for link, (own, payload) in changed.items():
+        for link, own in changed.items():
             share = values.get(f"{link}.{MASS}", own.mass) / own.mass
             own = replace(own, mass=own.mass * share, moments=own.moments * share)
             if (inertia := given.get(f"{link}.{TURNING}")) is not None:
                 own = own.turned(self.hinges[link].axis, inertia)
-            payload = values.get(f"{link}.{PAYLOAD}", payload)
-            if payload:
-                own = Principal.from_ten(own.ten + payload * point_mass(self.ends[link]))
-            own.put_into(model, self.links[link])
-        mj.mj_setConst(model, quiet_data(model))
-        return replace(self, model=model, given=given)
+            changed[link] = own
+        return replace(self, model=self._model_with(changed, values, armatures), given=given)
 
     def with_ends(self, places: Mapping[str, Array]) -> "MujocoBody":
         """A copy with payloads at these positions (3,) in the links' frames. Raises InputError for a link that
@@ -226,43 +221,52 @@ class MujocoBody(Body):
 
         Raises InputError for an unknown link, and for numbers that are those of no rigid body.
         """
-        mj, model = mujoco(), copy.copy(self.model)
-        for link, ten in values.items():
-            if link not in self.links:
-                raise InputError(
-                    f"{self.path}: has no link {link!r} that moves; those are {', '.join(self.links)}"
-                )
+        made: dict[str, Principal] = {}
+        for link, ten in self._of_links(values).items():
             own = Principal.from_ten(ten) if ten[0] > 0.0 else None
             if own is None or not own.possible:
                 raise InputError(
                     f"{self.path}: the inertia given for the link {link!r} is that of no rigid body"
                 )
-            if payload := self._payload(link):
-                own = Principal.from_ten(ten + payload * point_mass(self.ends[link]))
-            own.put_into(model, self.links[link])
-        mj.mj_setConst(model, quiet_data(model))
-        given = {
-            name: value
-            for name, value in self.given.items()
-            if name not in {f"{one}.{TURNING}" for one in values}
-        }
-        return replace(self, model=model, given=given, replaced={**self.replaced, **values})
+            made[link] = own
+        gone = {f"{one}.{TURNING}" for one in values}
+        given = {name: value for name, value in self.given.items() if name not in gone}
+        return replace(self, model=self._model_with(made), given=given, replaced={**self.replaced, **values})
 
     def with_centres(self, places: Mapping[str, Array]) -> "MujocoBody":
         """A copy in which the centres of mass of links, without their payloads, are at these places (3,) in their frames. Mass and inertia
-        about the centre stay. Raises InputError for a link that does not exist."""
-        mj, model = mujoco(), copy.copy(self.model)
-        for link, place in places.items():
+        about the centre stay. Raises InputError for an unknown link."""
+        made = {
+            link: replace(self.own(link), centre=np.asarray(place, dtype=float))
+            for link, place in self._of_links(places).items()
+        }
+        return replace(self, model=self._model_with(made), centres={**self.centres, **places})
+
+    def _of_links(self, values: Mapping[str, Array]) -> Mapping[str, Array]:
+        """The values; raises InputError for one of an unknown link."""
+        for link in values:
             if link not in self.links:
                 raise InputError(
-                    f"{self.path}: has no link {link!r} that moves; it has {', '.join(self.links)}"
+                    f"{self.path}: has no link {link!r} that moves; those are {', '.join(self.links)}"
                 )
-            own = replace(self.own(link), centre=np.asarray(place, dtype=float))
-            if payload := self._payload(link):
+        return values
+
+    def _model_with(
+        self,
+        inertias: Mapping[str, Principal],
+        values: Mapping[str, float] | None = None,
+        armatures: Mapping[int, float] | None = None,
+    ) -> Any:
+        """The compiled model with these inertias of links, to which payloads are added: those among `values`, or else the present ones."""
+        mj, model = mujoco(), copy.copy(self.model)
+        for place, armature in (armatures or {}).items():
+            model.dof_armature[place] = armature
+        for link, own in inertias.items():
+            if payload := (values or {}).get(f"{link}.{PAYLOAD}", self._payload(link)):
                 own = Principal.from_ten(own.ten + payload * point_mass(self.ends[link]))
             own.put_into(model, self.links[link])
         mj.mj_setConst(model, quiet_data(model))
-        return replace(self, model=model, centres={**self.centres, **places})
+        return model
 
     def _payload(self, link: str) -> float:
         return self.given.get(f"{link}.{PAYLOAD}", 0.0)
@@ -376,31 +380,6 @@ class MujocoBody(Body):
             mj.mj_collision(model, data)
             found[k] = data.ncon > 0
         return found
-
-
-def _joints(model: Any, path: Path) -> dict[str, Joint]:
-    """Joints with one degree of freedom. Raises InputError for a ball joint, and where there is none."""
-    mj, found = mujoco(), {}
-    for number in range(model.njnt):
-        kind, name = model.jnt_type[number], model.joint(number).name
-        if kind == mj.mjtJoint.mjJNT_BALL:
-            raise InputError(f"{path}: the ball joint {name!r} cannot be described; write it as three hinges")
-        if kind != mj.mjtJoint.mjJNT_FREE:
-            found[name] = Joint(
-                name, kind == mj.mjtJoint.mjJNT_HINGE, int(model.jnt_qposadr[number]), int(model.jnt_dofadr[number])
-            )  # fmt: skip
-    if not found:
-        raise InputError(f"{path}: has no hinge and no slide")
-    if "" in found:
-        raise InputError(f"{path}: has a joint without a name")
-    return found
-
-
-def _passive(model: Any) -> dict[str, Passive]:
-    return {
-        model.joint(number).name: Passive(float(model.dof_damping[dof]), float(model.dof_frictionloss[dof]))
-        for number, dof in enumerate(model.jnt_dofadr)
-    }
 
 
 def _listed(joints: Mapping[str, Joint]) -> str:

@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 
 from rhythmid.body.link_inertia import Principal
 from rhythmid.diagnose.answer.result import Estimate
+from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.joints.joint_case import JointResult
 from rhythmid.diagnose.joints.link_evidence import own_path, weight_of_values, with_body_of
 from rhythmid.diagnose.joints.payload_place import BESIDE, ROUNDS, rows_of, weighted_rows
@@ -28,21 +29,28 @@ PLACES = 3  # of a centre, that are fitted: each of them has to be beaten by the
 
 @dataclass(frozen=True, eq=False)
 class Centre:
-    """A link's centre of mass (3,) [m] in its frame, with standard deviations, and the log odds for it against another value."""
+    """A link's centre of mass (3,) [m] in its frame, with standard deviations, the file's centre `given` (3,) [m], and the log odds for it
+    against another value of the link."""
 
     place: Array
     std: Array
+    given: Array
     weight: float
+
+    @property
+    def moved(self) -> bool:
+        """Whether the records contradict the file's centre."""
+        return bool(np.any(np.abs(self.place - self.given) > CONTRADICTS * self.std))
 
     @property
     def better(self) -> bool:
         """Whether the joints together give it decisively more than the other value."""
-        return self.weight > decisive(PLACES)
+        return self.moved and self.weight > decisive(PLACES)
 
     @property
     def as_good(self) -> bool:
         """Whether the joints do not separate it from the other value."""
-        return self.weight >= -decisive(1)
+        return self.moved and self.weight >= -decisive(1)
 
     @property
     def values(self) -> dict[str, Estimate]:
@@ -93,7 +101,7 @@ def _fitted(
         ]
         place, std = _refined(rows, own, place)
         now = JointBalances.of(machine.with_centre(link, place), records, balances)
-    return Centre(place, std, weight_of_values(found, corrected, now, joints))
+    return Centre(place, std, own.centre, weight_of_values(found, corrected, now, joints))
 
 
 def _refined(rows: Sequence[tuple[Array, Array]], own: Principal, start: Array) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from rhythmid.body.body import BODY
 from rhythmid.diagnose.answer.result import Estimate
+from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.effort.candidate import widest, with_freed
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.evidence import predict
@@ -20,10 +21,6 @@ from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.robust_covariance import with_robust_std
 from rhythmid.model import Model
 from rhythmid.value import Prior
-
-CONTRADICTS = (
-    3.0  # standard deviations between what two joints make of a value, above which they do not mean the same
-)
 
 
 def own_path(balances: JointBalances, one: JointResult) -> Model:
