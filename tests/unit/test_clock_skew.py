@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from rhythmid.record.channel_quality import channel_quality
 from rhythmid.record.clock_skew import clock_skew
 from rhythmid.record.clocks import clock_notes
-from rhythmid.record.judged import judged
 from rhythmid.record.quality import ChannelQuality
 
 STAMPS = np.arange(30_000) * 1e-3
@@ -19,7 +19,7 @@ def lateness(rate: float, seed: int) -> np.ndarray:
 
 
 def channel(rate: float, seed: int) -> ChannelQuality:
-    return judged("made", STAMPS, lateness(rate, seed), STAMPS, np.sin(STAMPS), False, 0, 0)
+    return channel_quality("made", STAMPS, lateness(rate, seed), STAMPS, np.sin(STAMPS), False, 0, 0)
 
 
 def test_the_skew_lies_within_its_uncertainty():

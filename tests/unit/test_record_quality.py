@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rhythmid.errors import InputError
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.bag_writer import write_bag
-from rhythmid.record.judged import judged
+from rhythmid.record.channel_quality import channel_quality
 from rhythmid.record.messages import Messages
 from rhythmid.record.quality import ChannelQuality, Quality, clipped
 from rhythmid.record.timing import Timing, nominal_period, put_in_order
@@ -184,11 +184,11 @@ def test_infinite_values_do_not_disturb_what_is_told_of_the_others(recwarn):
     value = np.round(np.clip(np.sin(5.0 * time), -0.8, 0.9), 2)
     spoilt = value.copy()
     spoilt[[60, 61, 62, 200, 201, 202]] = np.inf
-    plain, found = (judged("q", time, None, time, one, False, 0, 0) for one in (value, spoilt))
+    plain, found = (channel_quality("q", time, None, time, one, False, 0, 0) for one in (value, spoilt))
     assert found.clipped > 0 and found.resolution == plain.resolution
     assert not recwarn.list
 
 
 def test_a_channel_of_which_nothing_is_finite_has_no_resolution():
-    found = judged("q", np.arange(9.0), None, np.arange(9.0), np.full(9, np.inf), True, 0, 0)
+    found = channel_quality("q", np.arange(9.0), None, np.arange(9.0), np.full(9, np.inf), True, 0, 0)
     assert found.resolution == 0.0 and not found.clipped

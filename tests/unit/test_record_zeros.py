@@ -16,8 +16,8 @@ from rhythmid.identify.record_zero import RECORD_ZERO
 from rhythmid.identify.series import hold_out_tail, prepare
 from rhythmid.identify.zero_estimates import zeros_told
 from rhythmid.model import Model
-from rhythmid.record.elsewhere import elsewhere_notes
 from rhythmid.record.record import Channel, Record
+from rhythmid.record.separate_zeros import separate_zeros_notes
 from rhythmid.simulation.simulate import simulate
 
 NOMINAL = """
@@ -160,5 +160,5 @@ def test_a_held_out_record_that_the_model_does_not_explain_has_no_zero_to_be_tol
 
 def test_positions_that_lie_far_apart_are_told_and_others_are_not():
     first, near, far = decays(nominal(), {"first": 0.0, "near": 0.4, "far": 9.0})
-    (note,) = elsewhere_notes([first, near, far])
+    (note,) = separate_zeros_notes([first, near, far])
     assert note.startswith("the output of far is between ") and "offset:" in note

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rhythmid.record.judged import judged
+from rhythmid.record.channel_quality import channel_quality
 from rhythmid.record.outlier import outlying_samples, repeated_samples
 from rhythmid.record.rounding import resolution, resolutions, shown_resolution
 from rhythmid.record.stamp_jitter import stamp_jitter
@@ -59,7 +59,7 @@ def test_single_precision_of_noisy_values_is_no_rounding() -> None:
 def test_a_square_wave_is_not_said_to_be_rounded_to_its_height() -> None:
     command = np.select([np.sin(TIME) > 0.5, np.sin(TIME) < -0.5], [2.8, 0.35], 1.57)
     assert shown_resolution(command) == 0.0
-    assert not judged("q", TIME, None, TIME, command, False, 0, 0).facts()[1:]
+    assert not channel_quality("q", TIME, None, TIME, command, False, 0, 0).facts()[1:]
 
 
 @pytest.mark.parametrize("motion", [np.cos(10.0 * TIME), np.sin(8.0 * TIME**1.5), TIME**2])

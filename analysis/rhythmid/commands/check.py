@@ -50,8 +50,8 @@ def check(
     from rhythmid.errors import InputError
     from rhythmid.progress_bar import progress
     from rhythmid.record.bag_report import BagReport, quality_report
-    from rhythmid.record.elsewhere import elsewhere_notes
     from rhythmid.record.joint_record import joint_records
+    from rhythmid.record.separate_zeros import separate_zeros_notes
 
     require_new(json, report)
     if report is not None and len(bags) > 1:
@@ -74,7 +74,7 @@ def check(
         for line in found.lines():
             terminal.say(line)
     records = [found.record for found in made if found.usable and found.record is not None]
-    elsewhere = elsewhere_notes(records)
+    elsewhere = separate_zeros_notes(records)
     for line in elsewhere:
         terminal.say(f"note: {line}")
     try:

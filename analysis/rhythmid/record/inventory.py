@@ -26,9 +26,9 @@ from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.message_types import typestore
 from rhythmid.record.other_lengths import length_notes, unequal_arrays
 from rhythmid.record.signals import Clock
+from rhythmid.record.stated_rate import stated_rate
 from rhythmid.record.table import SUFFIXES, WIDEST, Table, table_suffix
 from rhythmid.record.table_clock import COUNTER, is_even, is_further_time, is_time, table_clock
-from rhythmid.record.told_rate import told_rate
 from rhythmid.record.two_clocks import clock_notes, trusted_clock
 
 Array = NDArray[np.float64]
@@ -147,7 +147,7 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
     unequal = [(name, value) for name, value in columns if len(value) != count]
     columns = [(name, value) for name, value in columns if len(value) == count]
     notes = (*table.notes, *length_notes(table, count))
-    told = None if rate is not None else told_rate(table, columns)
+    told = None if rate is not None else stated_rate(table, columns)
     if told is not None:
         rate, reason = told
         clock, every = Clock("rate", rate=rate), np.arange(count) / rate

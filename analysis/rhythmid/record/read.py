@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.progress import Tell, counted, silent
+from rhythmid.record.arrival_bursts import without_bursts
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block, Topic
+from rhythmid.record.channel_quality import channel_quality
 from rhythmid.record.clocks import assumed_clock, clock_notes
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.foreign_file import refuse_foreign
-from rhythmid.record.held_back import evened
 from rhythmid.record.held_command import held_note
-from rhythmid.record.judged import judged
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
@@ -289,15 +289,15 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
                 f"{label}: {conflicts} of {len(samples.time)} samples have the time of another one with another value: "
                 f"two publishers, a clock set back or too coarse stamps; {mend}{_evenly(clocks[role])}"
             )
-        judgement[role] = judged(
+        judgement[role] = channel_quality(
             str(samples.source), samples.time, samples.lateness, time, value, stamped and role == "output", samples.missing, conflicts
         )  # fmt: skip
         if absent.any():
             time, value = time[~absent], value[~absent]
         shared = next((c.time for c in channels.values() if np.array_equal(c.time, time)), time)
         channels[role] = Channel(shared, value, samples.source.unit, str(samples.source))
-    channels, held_back = evened(channels)
-    notes = (*quality.notes, *clock_notes(judgement, clocks), *held_back)
+    channels, burst_notes = without_bursts(channels)
+    notes = (*quality.notes, *clock_notes(judgement, clocks), *burst_notes)
     return Record(
         name, input_kind=signals.input_kind, output_kind=signals.output_kind, forcing_law=signals.forcing_law,
         quality=replace(quality, channels=judgement, notes=notes, assumed=assumed_clock(judgement, clocks)),

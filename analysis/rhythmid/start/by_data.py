@@ -12,7 +12,6 @@ from rhythmid.record.output_copy import SAME, doubt_of_copy
 from rhythmid.start.carried import surely_drives
 from rhythmid.start.copies import is_second_sensor
 from rhythmid.start.direction import COPY
-from rhythmid.start.known import Choice, Known
 from rhythmid.start.meaning import (
     Quantity,
     differ_in_number,
@@ -35,6 +34,7 @@ from rhythmid.start.relation import (
     integrals,
     predicts,
 )
+from rhythmid.start.role_choice import Choice, Known
 
 OR_ELSE = "a base that moves is  kind: base_displacement, what a controller is asked for  kind: reference"
 NAMED = 8  # largest number of numbers in a note

@@ -4,8 +4,8 @@ driving signals."""
 from rhythmid.record.inventory import Recorded
 from rhythmid.record.output_copy import correlation_of_copy, smallest_step
 from rhythmid.start.direction import COPY
-from rhythmid.start.known import Known
 from rhythmid.start.relation import Follows, lead, together
+from rhythmid.start.role_choice import Known
 
 # standard errors of the lead, from six parts; a larger lead has a probability of 1 in 100 by chance
 CLEARLY = 4.0

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from rhythmid.record.inventory import Recorded
-from rhythmid.start.known import Known
 from rhythmid.start.meaning import ELECTRICAL, driving_unit_of
+from rhythmid.start.role_choice import Known
 
 MODELLED = (
     "effort",

@@ -3,8 +3,8 @@
 import json
 from collections.abc import Sequence
 
-from rhythmid.start.known import Known
 from rhythmid.start.meaning import words_of
+from rhythmid.start.role_choice import Known
 
 LISTED = 12  # largest number of numbers in the message
 AMBIGUOUS = frozenset(

@@ -10,9 +10,9 @@ from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, Recorded
 from rhythmid.start.balanced import UNEXPLAINED
 from rhythmid.start.force_unit import doubt_of_units
-from rhythmid.start.known import Choice
 from rhythmid.start.meaning import meaning_of
 from rhythmid.start.nominal import Nominal
+from rhythmid.start.role_choice import Choice
 from rhythmid.start.roles import Roles
 
 EXPLAINED = (

@@ -23,7 +23,7 @@ from rhythmid.record.joint_record import JointSignals, load_joint_records
 from rhythmid.start.drivers import not_read
 from rhythmid.start.families import GENERIC, Family, families_of, joints_of
 from rhythmid.start.meaning import Quantity, meaning_of, says_it_was_read, words_of
-from rhythmid.start.written import GUESSED, as_guessed, comment, time_of
+from rhythmid.start.yaml_text import GUESSED, as_guessed, comment, time_of
 
 CURRENTS = frozenset(
     {"i", "iq", "current", "currents", "amp", "amps", "ampere", "amperes"}

@@ -16,7 +16,6 @@ from rhythmid.start.copies import copies_output, note_of_copy, note_of_sensor
 from rhythmid.start.direction import by_direction, notes_of_other_joints
 from rhythmid.start.drivers import drivers
 from rhythmid.start.joint import Joint, joint_of, shows_motion
-from rhythmid.start.known import Ask, Choice, Known, pick, ranked_by_worth
 from rhythmid.start.meaning import (
     Quantity,
     doubt_of_letter,
@@ -27,6 +26,7 @@ from rhythmid.start.meaning import (
     says_who_asks,
 )
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along, runs_like_a_clock
+from rhythmid.start.role_choice import Ask, Choice, Known, pick, ranked_by_worth
 from rhythmid.start.step_before import BEFORE, duty_before, set_point_before, step_before
 from rhythmid.start.targets import with_targets
 from rhythmid.start.unnamed_joints import column_groups

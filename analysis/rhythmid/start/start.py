@@ -18,15 +18,15 @@ from rhythmid.record.rest_at_ends import rests_of, use_line
 from rhythmid.record.signals import Clock, Signals
 from rhythmid.record.standstill import standstill
 from rhythmid.start.force_unit import MODELLED
-from rhythmid.start.known import Ask
 from rhythmid.start.listed_joints import with_listed_joints
 from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.named_joints import with_joints
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
 from rhythmid.start.other_effort import by_other_effort
+from rhythmid.start.role_choice import Ask
 from rhythmid.start.roles import Roles, first_answer, guess_roles
 from rhythmid.start.sides import with_sides
-from rhythmid.start.written import GUESSED, as_guessed, clock_of, model_yaml, signals_yaml
+from rhythmid.start.yaml_text import GUESSED, as_guessed, clock_of, model_yaml, signals_yaml
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
 

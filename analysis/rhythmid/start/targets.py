@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rhythmid.start.known import Known
+from rhythmid.start.role_choice import Known
 
 TARGET = "t"
 AIMED_AT = frozenset({"position", "velocity"})

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from rhythmid.record.inventory import Recorded
 from rhythmid.start.direction import may_be_one_motion
-from rhythmid.start.known import Known
 from rhythmid.start.relation import coherent, follows, predicts
+from rhythmid.start.role_choice import Known
 
 FOLLOWS = 0.9  # coherence above which a linear servo generates one from the other, with any lag and gain
 

@@ -5,8 +5,8 @@ import numpy as np
 
 from rhythmid.record.inventory import Recorded
 from rhythmid.record.unsigned import WHY, is_unsigned
-from rhythmid.start.known import Known
 from rhythmid.start.relation import together
+from rhythmid.start.role_choice import Known
 
 
 def without_unsigned(

@@ -22,7 +22,7 @@ from rhythmid.diagnose.effort.run import EffortResult
 from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.elements.places import SENTENCES
 from rhythmid.identify.inverse_dynamics.estimate import variation_of
-from rhythmid.record.elsewhere import elsewhere_notes
+from rhythmid.record.separate_zeros import separate_zeros_notes
 
 NO_SENSOR = "The measurement is assumed to be the motion: effects in the sensor and in the measurement's time are not among the candidates."
 FIXED_SCALE = "The recorded effort is taken to be true in scale."
@@ -77,7 +77,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         calibration=recalibrated(case.nominal, chosen.fit.model, chosen.std()),
         excluded=tuple(Untried(name, why) for name, why in result.search.not_tried.items()),
         heldout=held,
-        notes=(*notes, *elsewhere_notes((*case.records[:1], *case.holdout))),
+        notes=(*notes, *separate_zeros_notes((*case.records[:1], *case.holdout))),
     )
 
 

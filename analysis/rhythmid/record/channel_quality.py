@@ -12,7 +12,7 @@ from rhythmid.record.timing import Timing
 Array = NDArray[np.float64]
 
 
-def judged(
+def channel_quality(
     source: str,
     recorded: Array,
     lateness: NDArray[np.floating] | None,

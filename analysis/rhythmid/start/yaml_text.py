@@ -16,9 +16,9 @@ from rhythmid.record.held_command import held_note
 from rhythmid.record.inventory import Inventory, Recorded, header_clock
 from rhythmid.record.record import Channel
 from rhythmid.record.signals import ROLES, Clock
-from rhythmid.start.known import Choice
 from rhythmid.start.meaning import driving_unit_of, meaning_of, tells_unit
 from rhythmid.start.nominal import Nominal
+from rhythmid.start.role_choice import Choice
 from rhythmid.start.roles import Roles
 from rhythmid.units import Units
 from rhythmid.value import Value

@@ -18,7 +18,7 @@ RATE = re.compile(
 )
 
 
-def told_rate(table: Table, columns: Sequence[tuple[str, NDArray[np.float64]]]) -> tuple[float, str] | None:
+def stated_rate(table: Table, columns: Sequence[tuple[str, NDArray[np.float64]]]) -> tuple[float, str] | None:
     """The rate of the rows [Hz] with the reason; None where a column is the time, or no single number is named as a
     step or a rate."""
     if has_time(columns):

@@ -7,7 +7,7 @@ import numpy as np
 from rhythmid.record.record import Record
 
 
-def elsewhere_notes(records: Sequence[Record]) -> tuple[str, ...]:
+def separate_zeros_notes(records: Sequence[Record]) -> tuple[str, ...]:
     """A line on each record whose position differs from that of the first by more than the motion of either; empty
     where none does.
 

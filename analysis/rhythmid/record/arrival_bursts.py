@@ -30,7 +30,7 @@ STEADY = 0.5
 LEAST_SAMPLES_IN_BURSTS = 200  # so that each part has several bursts
 
 
-def evened(channels: Mapping[str, Channel]) -> tuple[dict[str, Any], tuple[str, ...]]:
+def without_bursts(channels: Mapping[str, Channel]) -> tuple[dict[str, Any], tuple[str, ...]]:
     """The channels with the sampling times of samples that arrived in bursts, and a note where there are such samples.
 
     Channels with the same times are treated together. A channel with missing samples keeps its times.

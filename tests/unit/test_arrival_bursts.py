@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhythmid.record.held_back import LEAST_SAMPLES_IN_BURSTS, evened
+from rhythmid.record.arrival_bursts import LEAST_SAMPLES_IN_BURSTS, without_bursts
 from rhythmid.record.read import read_record
 from rhythmid.record.record import Channel
 
@@ -34,7 +34,7 @@ def one(time, value):
 @settings(max_examples=20, deadline=None)
 def test_samples_that_came_in_bursts_get_the_times_at_which_they_were_taken(seed):
     noise = 1e-3 * np.random.default_rng(seed).standard_normal(len(TAKEN))
-    found, notes = evened(one(came(TAKEN, seed), motion(TAKEN) + noise))
+    found, notes = without_bursts(one(came(TAKEN, seed), motion(TAKEN) + noise))
     error = found["output"].time - TAKEN
     assert np.abs(error).max() < 0.5 * PERIOD
     assert len(notes) == 1 and "came in bursts" in notes[0] and "evenly spaced, every" in notes[0]
@@ -44,7 +44,7 @@ def test_channels_that_share_their_times_are_treated_alike():
     time = came(TAKEN, 1)
     steps = np.repeat(np.arange(40.0), 100)  # a command that says nothing of its times by itself
     given_ = {"output": Channel(time, motion(TAKEN), "rad"), "input": Channel(time, steps, "N*m")}
-    found, notes = evened(given_)
+    found, notes = without_bursts(given_)
     assert found["input"].time is found["output"].time and "output and input" in notes[0]
 
 
@@ -57,7 +57,7 @@ def test_neither_slow_writing_nor_a_busy_while_hides_that_samples_came_in_bursts
     busy = (TAKEN > 8.0) & (TAKEN < 8.5)
     time[busy] = np.maximum(time[busy], 8.5)
     time = np.maximum.accumulate(time) + 1e-6 * np.arange(len(time))
-    found, notes = evened(one(time, motion(TAKEN)))
+    found, notes = without_bursts(one(time, motion(TAKEN)))
     assert len(notes) == 1 and np.abs(found["output"].time - TAKEN).max() < PERIOD
 
 
@@ -65,7 +65,7 @@ def test_neither_slow_writing_nor_a_busy_while_hides_that_samples_came_in_bursts
 def test_where_one_sample_is_lost_times_are_kept(place):
     time, value = np.delete(came(TAKEN, place), place), np.delete(motion(TAKEN), place)
     channels = one(time, value)
-    assert evened(channels) == (channels, ())
+    assert without_bursts(channels) == (channels, ())
 
 
 @pytest.mark.parametrize("case", ["even", "stamped in bursts", "noise alone", "samples lost", "few"])
@@ -81,7 +81,7 @@ def test_all_others_keep_their_times(case):
         "samples lost": one(time[kept], motion(TAKEN)[kept]),
         "few": one(time[: LEAST_SAMPLES_IN_BURSTS - 1], motion(TAKEN)[: LEAST_SAMPLES_IN_BURSTS - 1]),
     }[case]
-    assert evened(channels) == (channels, ())
+    assert without_bursts(channels) == (channels, ())
 
 
 def test_a_table_that_was_written_in_bursts_says_so_in_its_notes(tmp_path):
