@@ -46,3 +46,16 @@ def test_what_leaves_most_of_an_undecided_joints_effort_is_in_doubt_however_prob
     assert summary_of_joints([effect], (), (), answers) == (
         "In doubt: knee: Coulomb friction (probability 0.90)."
     )
+
+
+def test_two_values_of_one_link_are_told_together_where_one_of_them_is_surely_wrong():
+    mass = JointEffect("knee", "link_mass", "body", "m → m′", 0.9, 0.47, {}, 0.2, "shank")
+    load = JointEffect("knee", "payload", "body", "point mass", 0.5, 0.46, {}, 0.1, "shank")
+    answers = {"knee": diagnosed("missing_physics", "link_mass")}
+    assert summary_of_joints([mass, load], (), (), answers) == (
+        "The model is wrong at knee: the mass of shank or the payload of shank."
+    )
+    faint = replace(load, probability=0.2)
+    assert summary_of_joints([mass, faint], (), (), answers) == (
+        "In doubt: knee: the mass of shank (probability 0.47); knee: the payload of shank (probability 0.20)."
+    )

@@ -52,11 +52,12 @@ def compose_machine(
         for label in labels
         if label.removeprefix(f"{BODY}.") not in links
     ]
-    missing += [_link(machine, one) for one in links.values()]
-    missing.sort(key=lambda one: (not _holds(one, answers), -one.heldout_gain))
+    missing += [_link(machine, one, _of_same_link(one, links)) for one in links.values()]
+    holding = [one for one in missing if _holds(one, missing, answers)]
+    missing.sort(key=lambda one: (one not in holding, -one.heldout_gain))
     named = {one.joint for one in missing}
     unknown = tuple(j for j, one in answers.items() if one.verdict == "unknown_physics")
-    sure = {one.joint for one in missing if _holds(one, answers)}
+    sure = {one.joint for one in holding}
     undecided = tuple(
         j
         for j, one in answers.items()
@@ -82,7 +83,7 @@ def compose_machine(
             if joint in named or joint in undecided
             for group in one.indistinguishable
         )
-        + tuple(_alike_of(machine, one) for one in links.values() if one.alike),
+        + _alike_links(machine, links),
         fit={joint: {str(k): v for k, v in one.fit.items()} for joint, one in answers.items()},
         parameters={
             f"{joint}.{name}": value
@@ -143,8 +144,18 @@ def _gain(one: JointResult) -> float:
     return (before - after) / size
 
 
-def _link(machine: Machine, wrong: WrongLink) -> JointEffect:
-    """A link's mass, inertia or payload, with the evidence of the joint that shows it best."""
+def _of_same_link(wrong: WrongLink, links: Mapping[str, WrongLink]) -> list[WrongLink]:
+    """The corrected values of a link, this one among them.
+
+    Several of them together say that the inertia of the link is not the file's, and leave open in which of its ten parameters.
+    """
+    link = split(wrong.parameter)[0]
+    return [one for one in links.values() if split(one.parameter)[0] == link]
+
+
+def _link(machine: Machine, wrong: WrongLink, same: Sequence[WrongLink]) -> JointEffect:
+    """A link's mass, inertia, centre of mass or payload, with the evidence of the joint that shows it best; `same` are all corrected values
+    of the link, which share the probability."""
     one, label = wrong.shown, wrong.label
     decision = one.result.decision
     name, kind = split(wrong.parameter)
@@ -152,14 +163,21 @@ def _link(machine: Machine, wrong: WrongLink) -> JointEffect:
     slot, equation, _ = EQUATIONS[element]
     return JointEffect(
         machine.body.joint_of(name), element, slot, equation, decision.shares[label],
-        decision.probability[label] / (1 + len(wrong.alike)), dict(wrong.values), _gain(one), name,
+        decision.probability[label] / (len(same) + len(wrong.alike)), dict(wrong.values), _gain(one), name,
     )  # fmt: skip
 
 
-def _alike_of(machine: Machine, wrong: WrongLink) -> tuple[str, ...]:
-    """The quantities of a link that explain the records as well as one another."""
-    link, kind = split(wrong.parameter)
-    return tuple(f"{machine.body.joint_of(link)}: {name}" for name in (OF_LINKS[kind], *wrong.alike))
+def _alike_links(machine: Machine, links: Mapping[str, WrongLink]) -> tuple[tuple[str, ...], ...]:
+    """For each link the quantities of which the records do not tell which are wrong, where there are several."""
+    names: dict[str, list[str]] = {}
+    for one in links.values():
+        link, kind = split(one.parameter)
+        names.setdefault(link, []).extend((OF_LINKS[kind], *one.alike))
+    return tuple(
+        tuple(f"{machine.body.joint_of(link)}: {name}" for name in dict.fromkeys(found))
+        for link, found in names.items()
+        if len(found) > 1
+    )
 
 
 def summary_of_joints(
@@ -172,13 +190,16 @@ def summary_of_joints(
 
     For joints with unknown physics it names the quantity that the mismatch depends on; for undecided joints, the candidates.
     """
-    said, doubted = [], []
+    said, doubted, told = [], [], set[str]()
     for one in missing:
-        what = f"the {one.of_link}" if one.link else in_words(one.element)
-        if not _holds(one, answers):
+        if one.link and one.link in told:
+            continue
+        what = _in_words(one)
+        if not _holds(one, missing, answers):
             doubted.append(f"{one.joint}: {what} (probability {one.probability:.2f})")
             continue
-        others = [] if one.probability >= STATED else _in_its_place(one, answers)
+        others = [] if one.probability >= STATED else _in_its_place(one, missing, answers)
+        told |= {one.link} if one.link else set()
         said.append(f"{one.joint}: {' or '.join([what, *others])}")
     words = f"The model is wrong at {'; '.join(said)}." if said else ""
     words += f" In doubt: {'; '.join(doubted)}." if doubted else ""
@@ -189,23 +210,33 @@ def summary_of_joints(
     return words.strip() or "Nothing of practical size is missing at any joint."
 
 
-def _holds(one: JointEffect, answers: Mapping[str, Diagnosis]) -> bool:
+def _in_words(one: JointEffect) -> str:
+    return f"the {one.of_link}" if one.link else in_words(one.element)
+
+
+def _holds(one: JointEffect, missing: Sequence[JointEffect], answers: Mapping[str, Diagnosis]) -> bool:
     """Whether an effect is sure enough for the headline: by itself, or with those that are listed in its place.
 
-    Where the joint's own answer is undecided, what was fitted there has to explain the effort as an identified model does: what leaves more of it
+    If the joint's own answer is undecided, what was fitted there has to explain the effort as an identified model does: what leaves more of it
     may be the best of several wrong explanations.
     """
     answer = answers.get(one.joint)
-    if one.probability < STATED and not _in_its_place(one, answers):
+    if one.probability < STATED and not _in_its_place(one, missing, answers):
         return False
     return answer is None or answer.verdict == "missing_physics" or error_of(answer.fit["augmented"]) < BLIND
 
 
-def _in_its_place(one: JointEffect, answers: Mapping[str, Diagnosis]) -> list[str]:
-    """Effects that explain a joint as well as this one does, in words."""
+def _in_its_place(
+    one: JointEffect, missing: Sequence[JointEffect], answers: Mapping[str, Diagnosis]
+) -> list[str]:
+    """Effects that explain a joint as well as this one does, in words; for a value of a link its other values, where it is sure that one of
+    them is wrong."""
+    same = [other for other in missing if one.link and other.link == one.link]
+    sure = sum(other.probability for other in same) >= STATED
+    values = [_in_words(other) for other in same if sure and other is not one]
     known = answers[one.joint].indistinguishable if one.joint in answers else ()
     groups = [group for group in known if one.element in group]
-    return [in_words(name) for group in groups for name in group if name != one.element]
+    return values + [in_words(name) for group in groups for name in group if name != one.element]
 
 
 def _alike(joints: Sequence[str], answers: Mapping[str, Diagnosis]) -> dict[str, list[str]]:
