@@ -10,7 +10,6 @@ from rhythmid.diagnose.effort.kin import at_values_of
 from rhythmid.diagnose.effort.search import EffortSearch, search_effort
 
 KEPT = ("coulomb_friction", "asymmetric_coulomb_friction", "quadratic_drag", "viscous_damper")
-SHARP = 0.01  # m/s, of speeds of about 0.6
 FEW = CATALOGUE.without(*(name for name in CATALOGUE if name not in KEPT))
 
 
@@ -43,6 +42,7 @@ def test_no_values_are_taken_from_a_narrower_law(found):
 def test_a_special_case_fits_about_as_well_as_the_law_that_contains_it_where_both_are_true(found):
     rich, plain = (alone(found, name) for name in ("asymmetric_coulomb_friction", "coulomb_friction"))
     assert plain.fit.cost - rich.fit.cost < 3.0
-    # the records do not resolve so sharp a transition; a wide one would be another law
-    assert plain.model.value("coulomb_friction.transition") < SHARP
-    assert rich.model.value("asymmetric_coulomb_friction.transition") < SHARP
+    ratio = plain.model.value("coulomb_friction.transition") / rich.model.value(
+        "asymmetric_coulomb_friction.transition"
+    )
+    assert 0.5 < ratio < 2.0

@@ -9,19 +9,27 @@ from rhythmid.identify.inverse_dynamics.motion import Stretch
 RATE, NOISE = 1000.0, 1e-4
 
 
-def measured(line: float, seed: int) -> Stretch:
-    """Ten seconds of a motion at 1 and 3 Hz with a line at 60 Hz of this amplitude, and white noise."""
+def measured(line: float, seed: int, driven: bool = True) -> Stretch:
+    """Ten seconds of a motion at 1 and 3 Hz with a line at 60 Hz of this amplitude, and white noise; whether an effort drives the line, too."""
     time = np.arange(0.0, 10.0, 1.0 / RATE)
     motion = (
         np.sin(2.0 * np.pi * time) + 0.1 * np.sin(6.0 * np.pi * time) + line * np.sin(120.0 * np.pi * time)
     )
-    noise = NOISE * np.random.default_rng(seed).standard_normal(len(time))
-    return Stretch(0, "record", time, motion + noise, np.zeros(len(time)), 1.0 / RATE, "effort", "position")
+    rng = np.random.default_rng(seed)
+    noise = NOISE * rng.standard_normal(len(time))
+    effort = -np.sin(2.0 * np.pi * time) - float(driven) * np.sin(120.0 * np.pi * time)
+    effort += 0.1 * rng.standard_normal(len(time))
+    return Stretch(0, "record", time, motion + noise, effort, 1.0 / RATE, "effort", "position")
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_line_far_above_the_rest_of_the_motion_is_within_the_band(seed):
     assert 60.0 < bandwidth_of_motion([measured(2e-3, seed)])[0] < 70.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_vibration_that_no_effort_drives_does_not_widen_the_band(seed):
+    assert bandwidth_of_motion([measured(2e-3, seed, driven=False)])[0] < 40.0
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import detrend, welch
+from scipy.signal import coherence, detrend, welch
 
 from rhythmid.identify.inverse_dynamics.free_map import FreeMap
 from rhythmid.identify.inverse_dynamics.motion import Motion, Stretch, high_pass, low_pass, motion_of
@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 ABOVE = 4.0
 # share of the sample rate: there the derivatives of a spline have an error of 3 %
 HIGHEST_DERIVED_SHARE = 0.2
-HALF = 0.5  # share of the effort's power that a free map has to explain in the highest half-octave
+# share of the effort's power that a free map has to explain in the highest half-octave, and coherence from which it counts as driving a motion
+HALF = 0.5
 SEGMENTS = 8  # least number of segments of a record in Welch's spectra
 RIDGE = 1e-6  # share of the columns' power, as regularisation against collinear columns
 FLOORLESS = 1e-12  # share of the strongest line below which an apparent floor is leakage of the window
@@ -75,16 +76,23 @@ def bandwidth_below(motions: Sequence[Motion], motion: float, dominant: float, l
 def _of_motion(raw: Stretch) -> tuple[float, float]:
     """Highest frequency [Hz] at which the motion exceeds its noise floor, and its strongest frequency [Hz].
 
-    The spectrum may fall to the floor between two lines. The band includes such a gap where the velocity's power above `ABOVE` times the
-    floor, beyond the gap, is more than what it lacks within the gap.
+    The spectrum may fall to the floor between two lines. The band includes such a gap where the part of the velocity that is coherent with
+    what drives the machine has more power beyond the gap, above `ABOVE` times the floor, than it lacks within. A vibration of the structure
+    that nothing recorded drives is no part of it.
     """
     length = max(min(len(raw.output), 64), len(raw.output) // SEGMENTS)
     rate = 1.0 / raw.period
     frequency, power = welch(raw.output - raw.output.mean(), rate, nperseg=length, detrend="linear")
     floor = float(np.median(power[len(power) // 2 :]))
     peak = 1 + int(np.argmax(power[1:]))
-    gained = np.cumsum(frequency[peak:] ** 2 * (power[peak:] - ABOVE * floor))
-    last = min(peak + int(np.argmax(gained)) + 1, len(power) - 1)
+    below = np.flatnonzero(power[peak:] < ABOVE * floor)
+    last = peak + int(below[0]) if len(below) else len(power) - 1
+    if len(below) and np.ptp(raw.drive) > 0.0:
+        coherent = coherence(raw.output, raw.drive, rate, nperseg=length, detrend="linear")[1] >= HALF
+        driven = np.where(coherent, power, 0.0)
+        gained = np.cumsum((frequency**2 * (driven - ABOVE * floor))[last:])
+        beyond = int(np.argmax(gained))
+        last = min(last + beyond + 1, len(power) - 1) if gained[beyond] > 0.0 else last
     if floor < FLOORLESS * float(power.max()):
         last = len(power) - 1
     whole = np.abs(np.fft.rfft(detrend(raw.output) * np.hanning(len(raw.output))))
