@@ -107,7 +107,7 @@ def test_a_mismatch_that_is_no_noise_is_not_called_consistent_though_nothing_exp
     made = replace(contest(supposed("", predicted((missed * SIZE) ** 2))), structured=share)
     _, decision = decided(made)
     assert decision.verdict == expected
-    assert ("no noise" in decision.reason) is (expected == "undecided")
+    assert ("not noise" in decision.reason) is (expected == "undecided")
 
 
 def test_records_that_would_not_show_a_small_effect_still_show_a_large_one():

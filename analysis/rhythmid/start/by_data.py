@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 
-from rhythmid.errors import InputError
 from rhythmid.record.inventory import Recorded
 from rhythmid.record.output_copy import SAME, doubt_of_copy
 from rhythmid.start.carried import surely_drives
@@ -23,7 +22,7 @@ from rhythmid.start.meaning import (
     poses,
     says_that_it_drives,
 )
-from rhythmid.start.no_motion import no_motion
+from rhythmid.start.no_motion import NoMotionError, no_motion
 from rhythmid.start.relation import (
     GOES_ALONG,
     HARDLY,
@@ -49,7 +48,7 @@ def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[C
             known[0].taken_for("position")
         ]
     if not able:
-        raise InputError(f"{place}: {no_motion(known)}")
+        raise NoMotionError(f"{place}: {no_motion(known)}")
     if pairs := integrals([one.one for one in able]):
         motion, slope, r = max(pairs, key=lambda pair: float(np.nanstd(pair[0].value)))
         choice = Choice(motion, f"no name says it; it is the integral of {slope} ({r:.2f} correlation)")

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 
+from rhythmid.errors import InputError
 from rhythmid.start.meaning import words_of
 from rhythmid.start.role_choice import Known
 
@@ -10,6 +11,10 @@ LISTED = 12  # largest number of numbers in the message
 AMBIGUOUS = frozenset(
     {"current", "currents"}
 )  # of a name without a unit: amperes, or the present value of a quantity
+
+
+class NoMotionError(InputError):
+    """No recorded number can be a motion."""
 
 
 def no_motion(known: Sequence[Known]) -> str:

@@ -21,6 +21,7 @@ from rhythmid.start.force_unit import MODELLED
 from rhythmid.start.listed_joints import with_listed_joints
 from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.named_joints import with_joints
+from rhythmid.start.no_motion import NoMotionError
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
 from rhythmid.start.other_effort import by_other_effort
 from rhythmid.start.role_choice import Ask
@@ -129,14 +130,19 @@ def _guess_of_moving(
     sources: Sequence[str | Path], joint: str | None, rate: float | None, ask: Ask
 ) -> tuple[Guess, Sequence[str | Path]]:
     """The guess for the first recording in which the machine moves, and the recordings before it; for the first
-    one, and none, where it moves in none."""
-    guesses = (guess(source, joint, rate, ask) for source in sources)
-    first = None
-    for number, found in enumerate(guesses):
+    one, and none, where it moves in none. Raises NoMotionError where no recording has a motion."""
+    first, none = None, None
+    for number, source in enumerate(sources):
+        try:
+            found = guess(source, joint, rate, ask)
+        except NoMotionError as error:  # what does not move in one recording may move in another
+            none = none or error
+            continue
         if found.moves:
             return found, sources[:number]
         first = first or found
-    assert first is not None
+    if first is None:
+        raise none or InputError("no recording is given")
     return first, ()
 
 

@@ -40,7 +40,7 @@ def as_guessed() -> Iterator[None]:
         yield
     except InputError as error:
         said = re.sub(rf"^{re.escape(GUESSED)}(?::\d+)?: ", "guessed ", str(error))
-        raise InputError(said) from error
+        raise type(error)(said) from error
 
 
 def signals_yaml(
