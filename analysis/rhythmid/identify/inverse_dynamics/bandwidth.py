@@ -88,7 +88,8 @@ def _of_motion(raw: Stretch) -> tuple[float, float]:
     below = np.flatnonzero(power[peak:] < ABOVE * floor)
     last = peak + int(below[0]) if len(below) else len(power) - 1
     if len(below) and np.ptp(raw.drive) > 0.0:
-        coherent = coherence(raw.output, raw.drive, rate, nperseg=length, detrend="linear")[1] >= HALF
+        with np.errstate(divide="ignore", invalid="ignore"):  # where there is no power there is no coherence
+            coherent = coherence(raw.output, raw.drive, rate, nperseg=length, detrend="linear")[1] >= HALF
         driven = np.where(coherent, power, 0.0)
         gained = np.cumsum((frequency**2 * (driven - ABOVE * floor))[last:])
         beyond = int(np.argmax(gained))
