@@ -13,7 +13,7 @@ def test_each_joint_is_told_with_its_own_rivals():
     friction = replace(diagnosed("undecided"), summary="They are Coulomb friction or Stribeck friction.")
     astray = replace(diagnosed("undecided"), summary="The refitted nominal model misses 75 % of it.")
     answers = {"hip": friction, "knee": astray, "ankle": friction, "toe": diagnosed("consistent")}
-    assert summary_of_joints([], (), ("hip", "knee", "ankle"), answers) == (
+    assert summary_of_joints([], (), ("hip", "knee", "ankle"), answers, {}) == (
         "At hip, ankle the records do not decide: They are Coulomb friction or Stribeck friction. "
         "At knee the records do not decide: The refitted nominal model misses 75 % of it."
     )
@@ -23,18 +23,18 @@ def test_an_effect_that_others_replace_is_told_with_them_and_a_certain_one_alone
     alike = (("constant_force", "linear_spring", "pendulum_gravity"),)
     answers = {"knee": replace(diagnosed("undecided"), indistinguishable=alike)}
     effect = JointEffect("knee", "constant_force", "force", "F = F₀", 0.9, 0.3, {}, 0.2)
-    assert summary_of_joints([effect], (), (), answers) == (
+    assert summary_of_joints([effect], (), (), answers, {}) == (
         "The model is wrong at knee: constant force or linear spring or pendulum gravity."
     )
     sure = replace(effect, probability=0.9)
-    assert summary_of_joints([sure], (), (), answers) == "The model is wrong at knee: constant force."
+    assert summary_of_joints([sure], (), (), answers, {}) == "The model is wrong at knee: constant force."
 
 
 def test_a_name_of_low_probability_is_in_doubt_and_no_headline():
     effect = JointEffect("knee", "link_mass", "body", "m → m′", 0.9, 0.3, {}, 0.2, "shank")
     sure = JointEffect("hip", "coulomb_friction", "force", "F", 0.9, 0.95, {}, 0.2)
     answers = {"hip": diagnosed("missing_physics", "coulomb_friction"), "knee": diagnosed("undecided")}
-    assert summary_of_joints([sure, effect], (), (), answers) == (
+    assert summary_of_joints([sure, effect], (), (), answers, {}) == (
         "The model is wrong at hip: Coulomb friction. In doubt: knee: the mass of shank (probability 0.30)."
     )
 
@@ -43,19 +43,22 @@ def test_what_leaves_most_of_an_undecided_joints_effort_is_in_doubt_however_prob
     far = {"refitted_nominal": FitQuality(0.9, 0.89), "augmented": FitQuality(0.5, 0.46)}
     effect = JointEffect("knee", "coulomb_friction", "force", "F", 0.4, 0.9, {}, 0.2)
     answers = {"knee": replace(diagnosed("undecided"), fit=far)}
-    assert summary_of_joints([effect], (), (), answers) == (
+    assert summary_of_joints([effect], (), (), answers, {}) == (
         "In doubt: knee: Coulomb friction (probability 0.90)."
     )
 
 
-def test_two_values_of_one_link_are_told_together_where_one_of_them_is_surely_wrong():
+def test_the_quantities_of_a_link_are_told_together_where_one_of_them_is_surely_wrong():
     mass = JointEffect("knee", "link_mass", "body", "m → m′", 0.9, 0.47, {}, 0.2, "shank")
     load = JointEffect("knee", "payload", "body", "point mass", 0.5, 0.46, {}, 0.1, "shank")
     answers = {"knee": diagnosed("missing_physics", "link_mass")}
-    assert summary_of_joints([mass, load], (), (), answers) == (
+    assert summary_of_joints([mass, load], (), (), answers, {"shank": ("link_mass", "payload")}) == (
         "The model is wrong at knee: the mass of shank or the payload of shank."
     )
-    faint = replace(load, probability=0.2)
-    assert summary_of_joints([mass, faint], (), (), answers) == (
-        "In doubt: knee: the mass of shank (probability 0.47); knee: the payload of shank (probability 0.20)."
+    assert summary_of_joints([mass], (), (), answers, {"shank": ("link_mass", "link_centre_of_mass")}) == (
+        "The model is wrong at knee: the mass of shank or the centre of mass of shank."
+    )
+    faint = replace(mass, probability=0.3)
+    assert summary_of_joints([faint], (), (), answers, {"shank": ("link_mass", "payload")}) == (
+        "In doubt: knee: the mass of shank (probability 0.30)."
     )

@@ -1,6 +1,7 @@
 """A value of a link that one joint finds is judged by the evidence of all joints that it moves."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,12 +64,35 @@ def test_a_wrong_centre_of_mass_is_named_and_not_a_mass_or_a_payload(arm: Callab
 def test_a_mass_is_found_with_its_value_though_the_joint_above_has_a_friction(arm: Callable[[str], Machine]):
     nominal = arm(CENTRE)
     heavier = nominal.with_inertial({"lower.mass": 1.4}).with_element(
-        "one", load_catalogue()["coulomb_friction"], {"force": 0.5, "transition": 0.03}
+        "one", load_catalogue()["coulomb_friction"], {"force": 4.0, "transition": 0.03}
     )
     found = diagnosed(heavier, nominal)
+    assert {(one.joint, one.element) for one in found.missing} == {
+        ("two", "link_mass"),
+        ("one", "coulomb_friction"),
+    }
     (mass,) = [one for one in found.missing if one.link]
     assert (mass.element, mass.link) == ("link_mass", "lower")
     assert mass.parameters["mass"].value == pytest.approx(1.4, abs=0.01)
+
+
+def test_a_mass_that_stands_for_a_gain_of_its_joint_is_refuted_by_the_joint_above_and_taken_back(
+    arm: Callable[[str], Machine],
+):
+    nominal = arm(CENTRE)
+    record = run(nominal)
+    two = record.joints["two"]
+    louder = replace(two, effort=replace(two.effort, value=1.3 * two.effort.value))
+    known = load_catalogue()  # without the gain of an actuator, which would explain it
+    few = Catalogue({name: known[name] for name in ("viscous_damper", "coulomb_friction")})
+    said: list[str] = []
+    answer = diagnose_machine(
+        [replace(record, joints={**record.joints, "two": louder})], nominal, catalogue=few, tell=said.append
+    )
+    assert "lower.mass of two is refuted by the joints that it moves" in said
+    assert not {one.element for one in answer.diagnosis.missing} & {"link_mass", "payload"}
+    assert answer.diagnosis.joints["one"].verdict == "consistent"
+    assert answer.machine.body.parameters["lower.mass"] == pytest.approx(1.0)
 
 
 def test_joints_together_refute_a_mass_where_the_centre_is_wrong(arm: Callable[[str], Machine]):

@@ -1,6 +1,7 @@
 """Compose the answers of all joints."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from rhythmid.body.body import BODY
 from rhythmid.body.inertial_parameter import split
@@ -53,7 +54,8 @@ def compose_machine(
         if label.removeprefix(f"{BODY}.") not in links
     ]
     missing += [_link(machine, one, _of_same_link(one, links)) for one in links.values()]
-    holding = [one for one in missing if _holds(one, missing, answers)]
+    of_links = _quantities_of(links)
+    holding = [one for one in missing if _holds(one, answers, of_links)]
     missing.sort(key=lambda one: (one not in holding, -one.heldout_gain))
     named = {one.joint for one in missing}
     unknown = tuple(j for j, one in answers.items() if one.verdict == "unknown_physics")
@@ -72,7 +74,7 @@ def compose_machine(
         verdict = "undecided"
     return MachineDiagnosis(
         verdict=verdict,
-        summary=summary_of_joints(missing, unknown, undecided, answers),
+        summary=summary_of_joints(missing, unknown, undecided, answers, of_links),
         location=_location(missing, unknown, undecided),
         missing=tuple(missing),
         unknown=unknown,
@@ -83,7 +85,11 @@ def compose_machine(
             if joint in named or joint in undecided
             for group in one.indistinguishable
         )
-        + _alike_links(machine, links),
+        + tuple(
+            tuple(f"{machine.body.joint_of(link)}: {name}" for name in names)
+            for link, names in of_links.items()
+            if len(names) > 1
+        ),
         fit={joint: {str(k): v for k, v in one.fit.items()} for joint, one in answers.items()},
         parameters={
             f"{joint}.{name}": value
@@ -167,17 +173,13 @@ def _link(machine: Machine, wrong: WrongLink, same: Sequence[WrongLink]) -> Join
     )  # fmt: skip
 
 
-def _alike_links(machine: Machine, links: Mapping[str, WrongLink]) -> tuple[tuple[str, ...], ...]:
-    """For each link the quantities of which the records do not tell which are wrong, where there are several."""
-    names: dict[str, list[str]] = {}
+def _quantities_of(links: Mapping[str, WrongLink]) -> dict[str, tuple[str, ...]]:
+    """For each wrong link its quantities that may be the wrong ones: the corrected ones, and those that explain the records as well."""
+    names: dict[str, dict[str, None]] = {}
     for one in links.values():
         link, kind = split(one.parameter)
-        names.setdefault(link, []).extend((OF_LINKS[kind], *one.alike))
-    return tuple(
-        tuple(f"{machine.body.joint_of(link)}: {name}" for name in dict.fromkeys(found))
-        for link, found in names.items()
-        if len(found) > 1
-    )
+        names.setdefault(link, {}).update(dict.fromkeys((OF_LINKS[kind], *one.alike)))
+    return {link: tuple(found) for link, found in names.items()}
 
 
 def summary_of_joints(
@@ -185,8 +187,9 @@ def summary_of_joints(
     unknown: Sequence[str],
     undecided: Sequence[str],
     answers: Mapping[str, Diagnosis],
+    of_links: Mapping[str, Sequence[str]],
 ) -> str:
-    """Summary of the joints at which something is wrong.
+    """Summary of the joints at which something is wrong; `of_links` are the quantities of each wrong link that may be the wrong ones.
 
     For joints with unknown physics it names the quantity that the mismatch depends on; for undecided joints, the candidates.
     """
@@ -195,10 +198,10 @@ def summary_of_joints(
         if one.link and one.link in told:
             continue
         what = _in_words(one)
-        if not _holds(one, missing, answers):
+        if not _holds(one, answers, of_links):
             doubted.append(f"{one.joint}: {what} (probability {one.probability:.2f})")
             continue
-        others = [] if one.probability >= STATED else _in_its_place(one, missing, answers)
+        others = [] if one.probability >= STATED else _in_its_place(one, answers, of_links)
         told |= {one.link} if one.link else set()
         said.append(f"{one.joint}: {' or '.join([what, *others])}")
     words = f"The model is wrong at {'; '.join(said)}." if said else ""
@@ -214,26 +217,26 @@ def _in_words(one: JointEffect) -> str:
     return f"the {one.of_link}" if one.link else in_words(one.element)
 
 
-def _holds(one: JointEffect, missing: Sequence[JointEffect], answers: Mapping[str, Diagnosis]) -> bool:
+def _holds(one: JointEffect, answers: Mapping[str, Diagnosis], of_links: Mapping[str, Sequence[str]]) -> bool:
     """Whether an effect is sure enough for the headline: by itself, or with those that are listed in its place.
 
     If the joint's own answer is undecided, what was fitted there has to explain the effort as an identified model does: what leaves more of it
     may be the best of several wrong explanations.
     """
     answer = answers.get(one.joint)
-    if one.probability < STATED and not _in_its_place(one, missing, answers):
+    if one.probability < STATED and not _in_its_place(one, answers, of_links):
         return False
     return answer is None or answer.verdict == "missing_physics" or error_of(answer.fit["augmented"]) < BLIND
 
 
 def _in_its_place(
-    one: JointEffect, missing: Sequence[JointEffect], answers: Mapping[str, Diagnosis]
+    one: JointEffect, answers: Mapping[str, Diagnosis], of_links: Mapping[str, Sequence[str]]
 ) -> list[str]:
-    """Effects that explain a joint as well as this one does, in words; for a value of a link its other values, where it is sure that one of
-    them is wrong."""
-    same = [other for other in missing if one.link and other.link == one.link]
-    sure = sum(other.probability for other in same) >= STATED
-    values = [_in_words(other) for other in same if sure and other is not one]
+    """Effects that explain a joint as well as this one does, in words; for a quantity of a link the others that may be the wrong one, where it
+    is sure that one of them is."""
+    same = of_links.get(one.link, ()) if one.link else ()
+    sure = one.probability * len(same) >= STATED
+    values = [_in_words(replace(one, element=name)) for name in same if sure and name != one.element]
     known = answers[one.joint].indistinguishable if one.joint in answers else ()
     groups = [group for group in known if one.element in group]
     return values + [in_words(name) for group in groups for name in group if name != one.element]
