@@ -1,8 +1,7 @@
-"""A step of the input that was made as the record began: a machine at rest shows what was there before the first sample.
+"""A step of the input with which a record begins: the value before the step follows from the rest of the machine.
 
-A dead time shows where the input changes. Of a recorded change both sides are known; of one that was made with the first sample only the
-later one is. A machine that rests as the record begins, and moves later, tells the other: an effort was zero, a reference was where the
-output is.
+A dead time is visible where the input changes. Of a step with the first sample only the later value is recorded. If the machine is at rest
+at first and moves later, the earlier value is known as well: an effort was zero, a reference was equal to the output.
 """
 
 import numpy as np
@@ -14,20 +13,18 @@ from rhythmid.record.rounding import resolution
 from rhythmid.simulation.signal import Hold, continuous, zero_order_hold
 
 Array = NDArray[np.float64]
-HISTORY = (
-    1.0  # [s] before the first sample for which a value before it is told: the longest delay that is sought
+HISTORY = 1.0  # [s] length of the history before the first sample: the longest delay that is sought
+FIRST_INTERVALS = 3  # number of intervals from which rest at the start is decided
+REST_SPEED = 0.2  # largest speed at rest, relative to the rms speed of the whole record; that of a running machine is 1
+# least size of the first step, relative to the span of the input afterwards: 0.5 for a wave that begins at its peak, 1 for a pulse
+LEAST_STEP = 0.75
+CLEAR_STEP = (
+    8.0  # least step of the position from which a speed is computed, in standard deviations of its noise
 )
-FIRST = 3  # intervals by which it is told whether a machine starts from rest
-SLOW = (
-    0.2  # of the speed of the whole record, rms, that it then has at most: a machine that runs has all of it
-)
-# of the span of all that the input does later, that the first step has at least: a wave that begins at its peak has half, a pulse all of it
-LARGE = 0.75
-CLEAR = 8.0  # standard deviations of the noise, that a step of the position has at least from which a speed is told
 
 
 def value_before(record: Record) -> float | None:
-    """Value of the input [its unit] before its first sample, which was a step from there; None where nothing tells of such a step."""
+    """Value of the input [its unit] before its first sample, if that was a step; None if there is no sign of a step."""
     given = record.input
     if given is None or len(given) < 2 or record.forcing is not None or not _begins_together(record):
         return None
@@ -39,7 +36,7 @@ def value_before(record: Record) -> float | None:
         return None
     first = abs(float(given.value[0]) - before)
     later = float(np.ptp(given.value))
-    if first == 0.0 or first < LARGE * later or not starts_from_rest(record):
+    if first == 0.0 or first < LEAST_STEP * later or not starts_from_rest(record):
         return None
     return before
 
@@ -51,7 +48,7 @@ def stepped(record: Record, before: float) -> PPoly:
     begin = time[0] - HISTORY
     if np.ptp(value) == 0.0:
         return zero_order_hold(np.array([begin, time[0]]), np.array([before, value[0]]))
-    # what jumps as it begins is not band-limited
+    # a step is not band-limited
     hold: Hold = "zero" if record.hold == "zero" else "linear"
     later = continuous(time, value, hold)
     first = np.zeros((len(later.c), 1))
@@ -66,23 +63,23 @@ def _begins_together(record: Record) -> bool:
 
 
 def starts_from_rest(record: Record) -> bool:
-    """Whether the output is slow in its first samples beside what it becomes; never of an acceleration."""
+    """Whether the output is slow in its first samples compared with the whole record; False for an acceleration."""
     value = record.output.value
     if record.output_kind == "acceleration" or not np.isfinite(value).all():
         return False
     speed = np.abs(value) if record.output_kind == "velocity" else _speeds(value)
-    if len(speed) <= FIRST:
+    if len(speed) <= FIRST_INTERVALS:
         return False
     size = float(np.sqrt(np.mean(speed**2)))
-    return size > 0.0 and float(np.median(speed[:FIRST])) < SLOW * size
+    return size > 0.0 and float(np.median(speed[:FIRST_INTERVALS])) < REST_SPEED * size
 
 
 def _speeds(value: Array) -> Array:
-    """Steps (m,) of a position over so many samples that they stand clear of its noise and rounding; empty where none does."""
+    """Steps (m,) of a position over so many samples that they exceed its noise and rounding; empty if there are none."""
     noise = float(np.sqrt(np.mean(np.diff(value, 2) ** 2) / 6.0)) if len(value) > 2 else 0.0
-    least = CLEAR * max(noise, resolution(value) / np.sqrt(12.0))
+    least = CLEAR_STEP * max(noise, resolution(value) / np.sqrt(12.0))
     apart = 1
-    while apart <= len(value) // (2 * FIRST):
+    while apart <= len(value) // (2 * FIRST_INTERVALS):
         steps = np.abs(value[apart:] - value[:-apart])[::apart]
         if float(np.sqrt(np.mean(steps**2))) > least:
             return steps

@@ -1,22 +1,22 @@
-"""Rows at the beginning of a table that are left from before its clock was set to zero: what stood in a buffer as the recording began."""
+"""Rows at the start of a table from before its clock was set to zero: the content of a buffer when the recording began."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-MOST = 10  # rows that a buffer holds; where more come before, they are a recording of their own
+LONGEST_BUFFER = 10  # rows; more rows are a recording of their own
 
 
 def stale_rows(time: Array) -> int:
-    """Number of the first rows whose times (n,) lie beyond the next one's, where all times after them go forward; 0 where none do."""
+    """Number of first rows before the only step back of the times (n,); 0 if there is no such step, or if it comes later."""
     back = np.flatnonzero(np.diff(time) < 0.0)
-    if len(back) != 1 or back[0] >= MOST or back[0] + 2 >= len(time):
+    if len(back) != 1 or back[0] >= LONGEST_BUFFER or back[0] + 2 >= len(time):
         return 0
     return int(back[0]) + 1
 
 
 def without_stale_rows(time: Array, value: Array, file: str) -> tuple[Array, Array, dict[str, None]]:
-    """Times and values (n,) without such rows of a file, and what to tell of them, as the keys of a dict."""
+    """Times and values (n,) without such rows of a file, and the notes on them as keys of a dict."""
     count = stale_rows(time)
     if not count:
         return time, value, {}

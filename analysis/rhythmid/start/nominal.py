@@ -21,7 +21,7 @@ from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
 from rhythmid.value import Value
 
 LAW_KEPT = 0.5  # largest unexplained share of an effort for which a controller is taken as its cause
-FEW = 3.0  # samples by which channels of one recording may be apart because of filters and buses; see `direction`
+CHANNELS_APART = 3.0  # samples by which channels of one recording may be apart because of filters and buses; see `direction`
 # ratio to inertia times the motion's angular frequency, used where the balance shows no damping
 LEAST_DAMPING = 0.01
 
@@ -72,7 +72,7 @@ def _bare(units: Units, mass: float = 1.0, fixed: bool = False) -> Model:
 def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
     """Model from recorded force and motion, by the force balance."""
     driver = "effort" if "effort" in roles.choices else "input"
-    few = FEW * max(record.output.period for record in records)
+    few = CHANNELS_APART * max(record.output.period for record in records)
     acts_at_once = driver == "effort" or is_measured_effort(roles.choices[driver].recorded)
     latest = few if acts_at_once else LATEST_ACTION
     unit_told = tells_unit(roles.choices["output"].recorded)
@@ -231,7 +231,7 @@ def _servo(records: Sequence[Record], roles: Roles, units: Units, catalogue: Cat
     if law.delay > 0.0:
         model = model.with_element(catalogue["input_delay"], {"delay": _short(law.delay)})
         reasons["input_delay"] = "the balance is better when the reference acts so much later"
-        late = _doubt_of_delay(law.delay, FEW * max(record.output.period for record in records))
+        late = _doubt_of_delay(law.delay, CHANNELS_APART * max(record.output.period for record in records))
     told, doubts = "the reference drives; gains by ", late
     if law.left > UNEXPLAINED:
         told += "the frequency of the motion only"

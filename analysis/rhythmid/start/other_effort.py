@@ -1,6 +1,6 @@
-"""Another measured effort than the one that was chosen, where the balance of forces tells that this one drives the motion.
+"""Choice of another measured effort if the balance of forces shows that it drives the motion and the chosen one does not.
 
-A torque behind a gear or at a link may have next to nothing to do with what its motor's current does to the motion; names do not tell it.
+Names do not show this: a torque measured behind a gear may be almost unrelated to the motion that the motor's current causes.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,16 +15,14 @@ from rhythmid.start.nominal import Nominal
 from rhythmid.start.role_choice import Choice
 from rhythmid.start.roles import Roles
 
-EXPLAINED = (
-    0.5  # share of an effort that its balance has to explain, to be taken before one that names prefer
-)
+EXPLAINED = 0.5  # least share of another effort that its balance explains, for it to replace the effort chosen by name
 
 
 def by_other_effort(
     found: Inventory, roles: Roles, nominal: Nominal, tried: Callable[[Roles], Nominal]
 ) -> tuple[Roles, Nominal]:
-    """The roles and the model with that other effort of which the balance explains most, `tried` out; as given where the chosen one balances,
-    or no other one does."""
+    """The roles and the model with the effort that is best explained by the balance of forces; as given if the chosen effort is explained,
+    or no other one is. `tried` returns the model for other roles."""
     balanced = nominal.explained is None or nominal.explained >= 1.0 - UNEXPLAINED
     if balanced or roles.input_kind != "force":
         return roles, nominal
@@ -50,12 +48,12 @@ def by_other_effort(
 
 
 def _driver(roles: Roles) -> str:
-    """The role that the balance takes for what drives."""
+    """The role of the signal that drives the machine in the balance."""
     return "effort" if "effort" in roles.choices else "input"
 
 
 def _others(found: Inventory, roles: Roles) -> Iterator[Recorded]:
-    """Efforts that were measured, of the joint, and that play no role."""
+    """Measured efforts of the joint without a role."""
     taken = {id(choice.recorded) for choice in roles.choices.values()}
     for one in found.recorded:
         meaning = meaning_of(one)
@@ -65,7 +63,7 @@ def _others(found: Inventory, roles: Roles) -> Iterator[Recorded]:
 
 
 def _with(roles: Roles, other: Recorded) -> Roles:
-    """The roles with another effort; a command that is not in its unit is left out."""
+    """The roles with another effort; a command in another unit is left out."""
     role, choices = _driver(roles), dict(roles.choices)
     was = choices.pop(role)
     others = [was.recorded, *(one for one in was.others if one is not other)]

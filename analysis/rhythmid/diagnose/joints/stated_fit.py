@@ -8,10 +8,10 @@ from rhythmid.diagnose.effort.run import EffortResult
 
 
 def stated_fit(result: EffortResult, stated: Sequence[str]) -> Fitted:
-    """The nominal path's fit where nothing is stated, else the one with these labels.
+    """The nominal path's fit if nothing is stated, else the fit with these labels.
 
-    The chosen hypothesis may hold effects of too low a probability to be stated. Then the fit of the search with the stated ones alone is taken,
-    whose values do not lean on those effects; where the search has none, the chosen one without them.
+    The chosen hypothesis may contain effects whose probability is too low to be stated. Then the search's fit with the stated effects alone is
+    used, because its values do not depend on the others. If the search has none, the others are removed from the chosen fit.
     """
     if not stated:
         return result.nominal

@@ -1,4 +1,4 @@
-"""The links' inertias that were fitted to the efforts, in the machine: taken where they predict efforts better that no fit has seen."""
+"""Adoption of the links' inertias that were fitted to the efforts, if they predict held-out efforts better than the file's."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -16,8 +16,8 @@ from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
 
-BETTER = 0.05  # mean fall of the logarithm of the joints' held-out errors, by which the file's inertias are given up
-FLOOR = 1e-3  # of an effort, below which it does not matter how little is left
+LEAST_FALL = 0.05  # least mean fall of the logarithm of the joints' held-out errors for the file's inertias to be replaced
+LEAST_ERROR = 1e-3  # share of an effort below which errors are not compared further
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ def adopted_inertia(
     balances: JointBalances, fits: Mapping[str, tuple[Balance, EffortFit]], inertia: InertialEstimate,
     seen: Sequence[JointRecord], unseen: Sequence[JointRecord], free_rotor: Callable[[Model, float], Model],
 ) -> Adopted | None:  # fmt: skip
-    """The machine with the fitted inertias; None where the file's predict as well, or where the model lists masses or inertias of its own."""
+    """The machine with the fitted inertias; None if the file's predict as well, or if the model lists masses or inertias of its own."""
     machine = balances.machine
     if any(split(name)[1] != ARMATURE for name in machine.inertial):
         return None
@@ -54,7 +54,7 @@ def adopted_inertia(
         )
     except InputError:  # too little was held out
         return None
-    if not after or _mean(before) - _mean(after) < BETTER:
+    if not after or _mean(before) - _mean(after) < LEAST_FALL:
         return None
     most = max(before, key=lambda joint: before[joint] - after[joint])
     note = (
@@ -65,7 +65,7 @@ def adopted_inertia(
 
 
 def _errors(balances: JointBalances, fits: Mapping[str, tuple[Balance, EffortFit]]) -> dict[str, float]:
-    """The error of each joint's effort, as a share of it; without joints of which too little was held out."""
+    """Error of each joint's effort as a share of the effort, without joints of which too little was held out."""
     found: dict[str, float] = {}
     for joint, (_, fit) in fits.items():
         try:
@@ -78,4 +78,4 @@ def _errors(balances: JointBalances, fits: Mapping[str, tuple[Balance, EffortFit
 
 
 def _mean(errors: Mapping[str, float]) -> float:
-    return float(np.mean([math.log(one + FLOOR) for one in errors.values()]))
+    return float(np.mean([math.log(one + LEAST_ERROR) for one in errors.values()]))

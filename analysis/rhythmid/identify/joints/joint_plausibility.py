@@ -27,8 +27,8 @@ from rhythmid.report.quantity import number
 
 Readings = tuple[Reading, ...]
 CLEARLY = 0.5  # largest ratio of another reading's effort residual to that of the declared one
-TELLS = 0.5  # least share of an effort's power that the body explains where a change of this joint alone is proposed
-RARER = 1.1  # weight of a change of positions: where a machine's mirror image moves alike, the effort's sign is the likelier change
+LEAST_EXPLAINED = 0.5  # least share of an effort's power that the body explains where a change of this joint alone is proposed
+POSITION_CHANGE = 1.1  # weight of a change of positions: where a machine's mirror image moves alike, the effort's sign is the likelier change
 HELPS = 0.05  # least fall of the mean logarithm of the residuals for each change
 # factors for rotational and for prismatic joints
 POSITIONS = {True: (DEGREE, 1.0 / DEGREE), False: (1e-3, 1e3)}
@@ -81,7 +81,7 @@ def _changes(motion: RecordedMotion, readings: Readings) -> float:
     """How much a reading changes: what is the same at every joint is one change, an exchange of two joints is one."""
     moved = sum(one.source != own.source for one, own in zip(readings, motion.as_declared, strict=True))
     found = float((moved + 1) // 2)
-    for channel, cost in (("position", RARER), ("effort", 1.0)):
+    for channel, cost in (("position", POSITION_CHANGE), ("effort", 1.0)):
         made = [_sort(getattr(one, channel)) for one in readings]
         changed = len(made) - made.count("")
         found += cost * min([changed, *(1 + len(made) - made.count(kind) for kind in set(made) - {""})])
@@ -184,7 +184,9 @@ def _told_alone(motion: RecordedMotion, found: Readings) -> Readings:
     """The reading without what it changes at joints of which the body tells too little; changes that most joints have stay together."""
     kinds = [(_sort(one.position), _sort(one.effort)) for one in found]
     return tuple(
-        one if known.told >= TELLS or one.source != own.source or 2 * kinds.count(kind) > len(found) else own
+        one
+        if known.told >= LEAST_EXPLAINED or one.source != own.source or 2 * kinds.count(kind) > len(found)
+        else own
         for one, own, known, kind in zip(
             found, motion.as_declared, motion.balanced(found), kinds, strict=True
         )
