@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 ABOVE = 4.0
 # share of the sample rate: there the derivatives of a spline have an error of 3 %
 HIGHEST_DERIVED_SHARE = 0.2
-# share of the effort's power that a free map has to explain in the highest half-octave, and coherence from which it counts as driving a motion
+# share of the effort's power that a free map has to explain, and coherence from which it counts as driving a motion
 HALF = 0.5
 SEGMENTS = 8  # least number of segments of a record in Welch's spectra
 RIDGE = 1e-6  # share of the columns' power, as regularisation against collinear columns
@@ -160,7 +160,11 @@ def _columns(free: FreeMap, motion: Motion, lines: Sequence[float]) -> Array:
 def _of_effort(
     motions: Sequence[Motion], most: float, dominant: float, low: float, lines: Sequence[float]
 ) -> float:
-    """Upper end [Hz] of the highest half-octave in which a free map explains half of the effort's power."""
+    """Frequency [Hz] up to which a free map explains more than half of the effort's power.
+
+    In whole half-octaves. The band includes one that is not explained where those above it make up for it: a vibration with little power
+    far above the motion, which happens to be explained, does not.
+    """
     efforts, left = _residuals(motions, most, low, lines)
     edges = most / np.sqrt(2.0) ** np.arange(64)
     edges = edges[edges >= dominant]
@@ -173,8 +177,10 @@ def _of_effort(
             inside = (frequency <= edges[index]) & (frequency > edges[index + 1])
             total[index] += len(effort) * power[inside].sum()
             remains[index] += len(effort) * rest[inside].sum()
-    explained = np.flatnonzero((total > 0.0) & (remains <= HALF * total))
-    return float(edges[explained[0]]) if len(explained) else float(edges[-1] if len(edges) else most)
+    gained = np.cumsum((HALF * total - remains)[::-1])  # from the lowest half-octave on
+    if not len(gained) or gained.max() <= 0.0:
+        return float(edges[-1] if len(edges) else most)
+    return float(edges[len(gained) - 1 - int(np.argmax(gained))])
 
 
 def _explained(motions: Sequence[Motion], frequency: float, low: float, lines: Sequence[float]) -> float:
