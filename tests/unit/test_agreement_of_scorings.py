@@ -11,6 +11,8 @@ from rhythmid.diagnose import diagnosis as module
 from rhythmid.diagnose.answer.result import Diagnosis, Untried
 from rhythmid.diagnose.diagnosis import ANOTHER, DOUBTED, Answer, diagnose
 from rhythmid.errors import InputError
+from rhythmid.model import Model
+from rhythmid.simulation.transport import INPUT_DELAY
 
 RECORD = records(hopper(), SHORT[2:])
 FRICTION = diagnosed("missing_physics", "coulomb_friction")
@@ -92,6 +94,36 @@ def test_every_other_verdict_is_told_with_what_it_says(monkeypatch):
     assert found.notes == (
         "Scored in free run the same records come to another verdict. The verdict is undecided.",
     )
+
+
+@pytest.mark.parametrize("verdict", ["undecided", "unknown_physics"])
+def test_effort_that_names_nothing_does_not_contradict_a_name_from_a_free_run(monkeypatch, verdict):
+    found, asked = answered(monkeypatch, FRICTION, by_effort=diagnosed(verdict, kind="effort"))
+    assert found == FRICTION and asked == [1]
+
+
+def test_effort_that_comes_first_and_knows_no_name_contradicts_one_from_windows(monkeypatch):
+    named = diagnosed("missing_physics", "coulomb_friction", kind="windows")
+    found, _ = answered(monkeypatch, diagnosed("unknown_physics", kind="effort"), named)
+    (note,) = found.notes
+    assert note.startswith("Scored by effort the same records come to another verdict.")
+
+
+def test_effort_is_compared_at_the_delays_that_the_motion_shows(monkeypatch):
+    asked: list[Model] = []
+    late = hopper().with_values({INPUT_DELAY: 0.04})
+
+    def effort(case, *_):
+        asked.append(case.nominal)
+        return Answer(FRICTION, case.nominal, SimpleNamespace())  # type: ignore[arg-type]
+
+    monkeypatch.setattr(module, "applicable", lambda *_: SimpleNamespace(applies=True))
+    monkeypatch.setattr(module, "_answers", lambda *_: iter([Answer(FRICTION, late, SimpleNamespace())]))
+    monkeypatch.setattr(module, "_by_effort", effort)
+    diagnose(RECORD, hopper(), catalogue=CATALOGUE)
+    (nominal,) = asked
+    assert nominal.value(INPUT_DELAY) == 0.04
+    assert nominal.mass == hopper().mass
 
 
 def test_one_way_to_score_is_compared_with_nothing(monkeypatch):

@@ -24,12 +24,13 @@ from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
 from rhythmid.diagnose.free_map import without_free_maps
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
-from rhythmid.diagnose.hypothesis import ScoringKind
+from rhythmid.diagnose.hypothesis import ScoringKind, Verdict
 from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import with_declared
+from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.inverse_dynamics.applicability import Applicability, applicable
 from rhythmid.identify.joint_covariance import JointCovariance
 from rhythmid.identify.plausibility import BACK, check_plausible, shift
@@ -53,6 +54,10 @@ if TYPE_CHECKING:
 HOW: Mapping[ScoringKind, str] = {"free_run": "in free run", "windows": "in windows", "effort": "by effort"}
 BY_EFFORT, BY_MOTION = "scoring by the recorded effort", "scoring by the motion, in free run or in windows"
 ANOTHER = "another scoring mode"
+OPEN: tuple[Verdict, ...] = (
+    "undecided",
+    "unknown_physics",
+)  # verdicts that neither state a name nor deny a mismatch
 DOUBTED = "Believe neither without another experiment."
 
 
@@ -245,7 +250,7 @@ def diagnose(
             if case.budget.spent:
                 untried.append(Untried("a comparison with the recorded effort", SPENT))
             else:
-                made.append(_by_effort(whole, effort, (), len(chosen.diagnosis.missing)))
+                made.append(_also_by_effort(whole, effort, chosen))
         answer = _with_untried(_compared(chosen, made), untried)
         return with_unit_warning(answer, case.nominal, warned)
 
@@ -347,10 +352,28 @@ def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: in
     return Answer(compose_effort(case, result, notes), result.chosen.model, result)
 
 
+def _also_by_effort(case: Case, effort: Applicability, chosen: Answer) -> Answer:
+    """The answer of effort scoring beside one that was chosen from the motion, with the delays that the motion shows.
+
+    The effort is compared with the motion at one instant, so that a wrong delay of the nominal model would appear as missing physics.
+    """
+    known = case.nominal.parameters.keys() & chosen.model.parameters.keys() & set(DELAYS)
+    nominal = case.nominal.with_values({name: chosen.model.value(name) for name in known})
+    return _by_effort(replace(case, nominal=nominal), effort, (), len(chosen.diagnosis.missing))
+
+
 def _compared(answer: Answer, made: Sequence[Answer]) -> Answer:
-    """The answer with a note for each answer in `made` by another scoring mode that has another verdict or other names."""
-    found = answer.diagnosis
-    notes = [_difference(found, other.diagnosis) for other in made if other is not answer]
+    """The answer with a note for each answer in `made` by another scoring mode that has another verdict or other names.
+
+    The most informative scoring mode comes first. That a later one names nothing does not contradict an answer that states names.
+    """
+    found, place = answer.diagnosis, next(index for index, one in enumerate(made) if one is answer)
+    told_by = [
+        other.diagnosis
+        for index, other in enumerate(made)
+        if index < place or (index > place and not (answer.stands and other.diagnosis.verdict in OPEN))
+    ]
+    notes = [_difference(found, other) for other in told_by]
     told = tuple(note for note in notes if note is not None)
     return replace(answer, diagnosis=replace(found, notes=(*found.notes, *told))) if told else answer
 
