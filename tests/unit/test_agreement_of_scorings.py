@@ -8,8 +8,9 @@ from answers import diagnosed
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.deadline import SPENT
 from rhythmid.diagnose import diagnosis as module
+from rhythmid.diagnose.agreement import DOUBTED
 from rhythmid.diagnose.answer.result import Diagnosis, Untried
-from rhythmid.diagnose.diagnosis import ANOTHER, DOUBTED, Answer, diagnose
+from rhythmid.diagnose.diagnosis import ANOTHER, Answer, diagnose
 from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.simulation.transport import INPUT_DELAY

@@ -13,18 +13,17 @@ from threadpoolctl import threadpool_limits
 
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.admission import Admitted, admitted
+from rhythmid.diagnose.agreement import HOW, contradictions
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis, Untried
 from rhythmid.diagnose.baseline import causal, check_free
 from rhythmid.diagnose.case import LEAST_CALIBRATION, SEARCHED, Budget, Case
 from rhythmid.diagnose.constants import DRIVES_IT, LEFT, QUASI_STATIC
-from rhythmid.diagnose.effort.candidate import SEEN
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
 from rhythmid.diagnose.free_map import without_free_maps
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
-from rhythmid.diagnose.hypothesis import ScoringKind, Verdict
 from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
@@ -41,7 +40,6 @@ from rhythmid.parallel import cores
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 from rhythmid.record.same_recording import check_held_out
-from rhythmid.report.quantity import in_words
 from rhythmid.result import Result, Row, axis_or_new
 
 if TYPE_CHECKING:
@@ -51,14 +49,8 @@ if TYPE_CHECKING:
     from rhythmid.body.machine import Machine
     from rhythmid.record.joint_record import JointRecord
 
-HOW: Mapping[ScoringKind, str] = {"free_run": "in free run", "windows": "in windows", "effort": "by effort"}
 BY_EFFORT, BY_MOTION = "scoring by the recorded effort", "scoring by the motion, in free run or in windows"
 ANOTHER = "another scoring mode"
-OPEN: tuple[Verdict, ...] = (
-    "undecided",
-    "unknown_physics",
-)  # verdicts that neither state a name nor deny a mismatch
-DOUBTED = "Believe neither without another experiment."
 
 
 @dataclass(frozen=True)
@@ -363,37 +355,11 @@ def _also_by_effort(case: Case, effort: Applicability, chosen: Answer) -> Answer
 
 
 def _compared(answer: Answer, made: Sequence[Answer]) -> Answer:
-    """The answer with a note for each answer in `made` by another scoring mode that has another verdict or other names.
-
-    The most informative scoring mode comes first. That a later one names nothing does not contradict an answer that states names.
-    """
-    found, place = answer.diagnosis, next(index for index, one in enumerate(made) if one is answer)
-    told_by = [
-        other.diagnosis
-        for index, other in enumerate(made)
-        if index < place or (index > place and not (answer.stands and other.diagnosis.verdict in OPEN))
-    ]
-    notes = [_difference(found, other) for other in told_by]
-    told = tuple(note for note in notes if note is not None)
+    """The answer with a note for each other answer in `made` that contradicts it."""
+    place = next(index for index, one in enumerate(made) if one is answer)
+    found = answer.diagnosis
+    told = contradictions(place, [one.diagnosis for one in made])
     return replace(answer, diagnosis=replace(found, notes=(*found.notes, *told))) if told else answer
-
-
-def _difference(found: Diagnosis, other: Diagnosis) -> str | None:
-    """One sentence: how the result of another scoring mode contradicts an answer.
-
-    None where they agree, or where the other mode could not show the named effects.
-    """
-    scored = f"Scored {HOW[other.scoring.kind]} the same records"
-    names, others = ({effect.element for effect in one.missing} for one in (found, other))
-    if found.verdict == other.verdict:
-        if found.verdict != "missing_physics" or names & others:
-            return None
-        words = in_words(" and ".join(sorted(others)))
-        return f"{scored} stand by another name: {words}. {DOUBTED}"
-    if found.verdict == "missing_physics" and other.verdict == "consistent":
-        hidden = other.scoring.kind == "effort" and not any(one.slot in SEEN for one in found.missing)
-        return None if hidden else f"{scored} lack nothing of practical size. {DOUBTED}"
-    return f"{scored} come to another verdict. {other.summary}"
 
 
 def _with_untried(answer: Answer, untried: Sequence[Untried]) -> Answer:
