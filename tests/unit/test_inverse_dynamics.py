@@ -9,9 +9,9 @@ from axes import CATALOGUE, axis, axis_model, frame, frame_model
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import applicable
 from rhythmid.identify.inverse_dynamics.balance import Balance, stuck
-from rhythmid.identify.inverse_dynamics.estimate import FARTHEST, fit_effort, size_of
+from rhythmid.identify.inverse_dynamics.estimate import FARTHEST, fit_effort, size_of, variation_of
 from rhythmid.identify.inverse_dynamics.inversion import FLAT, SECANT
-from rhythmid.record.record import Channel
+from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.effect import effect_along
 
 FRICTION = {"force": 0.3, "transition": 0.02}
@@ -130,6 +130,34 @@ def test_the_effort_is_not_scored_where_the_machine_swings_by_itself():
     found = applicable([axis(free=True)], axis_model())
     assert not found.applies
     assert "swings by itself" in found.reason
+
+
+def one_speed(change: float) -> Record:
+    """An axis with 3 N s/m at the constant speed that 6 N give, the force with steps of this size [N], the position with noise of 1 mm."""
+    time = np.arange(0.0, 20.0, 0.01)
+    effort = 6.0 + change * np.sign(np.sin(2.0 * np.pi * 0.3 * time))
+    position = np.cumsum(effort) * 0.01 / 3.0 + 1e-3 * np.random.default_rng(2).standard_normal(len(time))
+    return replace(axis(), output=Channel(time, position, "m"), input=Channel(time, effort, "N"))
+
+
+def test_an_effort_at_one_operating_point_is_not_scored():
+    light = axis_model().with_values({"inertia.mass": 0.01})
+    found = applicable([one_speed(0.01)], light)
+    assert not found.applies and "one operating point" in found.reason
+    assert "one operating point" not in applicable([one_speed(0.3)], light).reason
+
+
+def test_errors_are_relative_to_the_effort_about_its_mean_in_motions_of_both_directions():
+    record = axis()
+    assert record.input is not None
+    held = replace(record, input=replace(record.input, value=record.input.value + 50.0))
+    one, other = (variation_of(Balance.of([r], axis_model())) for r in (record, held))
+    assert other == pytest.approx(one, rel=0.05)
+
+
+def test_errors_are_relative_to_the_effort_itself_in_motions_of_one_direction():
+    balance = Balance.of([one_speed(0.3)], axis_model())
+    assert variation_of(balance) == pytest.approx(6.0, rel=0.02)
 
 
 def test_the_effort_is_not_scored_where_it_has_nothing_to_do_with_the_motion():

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import condition_of, fit_effort
+from rhythmid.identify.inverse_dynamics.estimate import condition_of, fit_effort, size_of
 from rhythmid.identify.inverse_dynamics.rests import told
 from rhythmid.model import INERTIA, Model
 from rhythmid.record.record import Record
@@ -27,6 +27,9 @@ EXPLAINED_BY_MOTION = 0.5
 # least variation of the effort relative to the inertial force: below it the machine swings freely, and the balance
 # is a small difference of two large terms (a resonance of 10 % damping is driven by a fifth of its inertial force)
 LIGHT = 0.2
+# least variation of the effort, as a share of its size: an effort that is constant but for less than what is of practical
+# importance is one operating point, and the noise of the motion decides between its explanations
+LEAST_VARIATION = 0.005
 POINTS = 50  # positions at which a restoring force is evaluated
 
 
@@ -80,6 +83,11 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
         applies, reason = (
             False,
             f"no map of the motion explains more than {chosen.explained:.0%} of the effort",
+        )
+    elif (varies := float(np.std(balance.measured)) / size_of(balance)) < LEAST_VARIATION:
+        applies, reason = (
+            False,
+            f"the effort varies by {varies:.1%} of its size only, outside rests: one operating point does not separate its causes",
         )
     elif share < LIGHT:
         applies, reason = (

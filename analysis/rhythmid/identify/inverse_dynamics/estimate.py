@@ -89,9 +89,18 @@ def size_of(balance: Balance) -> float:
 
 
 def variation_of(balance: Balance) -> float:
-    """Reference for relative errors: the rms of the recorded effort about its mean, because a constant holding
-    force says nothing about a motion. For a constant effort it is the effort's size."""
-    return float(np.std(balance.measured)) or size_of(balance)
+    """Reference for relative errors: the rms of the recorded effort about its mean, because a constant holding force
+    says nothing about a motion.
+
+    Where the motion has one direction only, the mean may as well be friction, and is kept: only that component of a
+    constant is removed which is orthogonal to the direction of motion. For a constant effort it is the effort's size.
+    """
+    effort, direction = balance.measured, np.sign(balance.mechanical[:, 1])
+    constant = 1.0 - np.mean(direction) * direction
+    power = float(constant @ constant)
+    if power > 0.0:
+        effort = effort - constant * (float(constant @ effort) / power)
+    return float(np.sqrt(np.mean(effort**2))) or size_of(balance)
 
 
 def priors_of(balance: Balance, model: Model, names: Sequence[str], columns: Array) -> dict[str, Prior]:
