@@ -62,6 +62,19 @@ def test_a_hysteresis_that_hardly_yields_within_the_travel_is_not_named_in_the_p
     assert spring.chosen.elements == ("linear_spring",)
 
 
+def test_a_weight_beside_friction_is_no_friction_that_acts_in_one_direction_only():
+    record = axis(friction=0.3)
+    assert record.input is not None
+    loaded = replace(record, input=replace(record.input, value=record.input.value + 2.0))
+    three = ("asymmetric_coulomb_friction", "coulomb_friction", "constant_force")
+    only = CATALOGUE.without(*(name for name in CATALOGUE if name not in three))
+    found = search_effort([loaded], axis_model(), only)
+    assert set(found.chosen.elements) == {"coulomb_friction", "constant_force"}
+    (out,) = [one for one in found.ruled_out if one.elements == ("asymmetric_coulomb_friction",)]
+    assert out.shape["within_bounds"] < SHAPES["within_bounds"]
+    assert found.chosen.model.value("constant_force.force") == pytest.approx(-2.0, abs=0.05)
+
+
 def test_a_name_predicts_no_worse_than_unknown_physics(friction):
     chosen, nominal, unknown = errors_of(friction, friction.chosen, friction.nominal)
     assert chosen < 1.1 * unknown and nominal > 10.0 * unknown

@@ -9,6 +9,9 @@ import math
 
 from rhythmid.elements.element import STEP, Element, Parameter
 
+# beyond, friction would push in one direction; at the limit a constant force is the likelier cause
+ONE_SIDED = (-1.0, 1.0)
+
 
 def kernel(x, v, t, f, force, asymmetry, transition, mass, step):
     sign = math.tanh(v / max(transition, 0.5 * force * step / mass, 1e-300))
@@ -23,7 +26,7 @@ ELEMENT = Element(
     parameters=(
         Parameter("force", "N", "mean friction force F_c of both directions", bounds=(0.0, math.inf)),
         Parameter(
-            "asymmetry", "1", "asymmetry a: F_c (1 + a) for v > 0, F_c (1 − a) for v < 0", bounds=(-1.0, 1.0)
+            "asymmetry", "1", "asymmetry a: F_c (1 + a) for v > 0, F_c (1 − a) for v < 0", bounds=ONE_SIDED
         ),
         Parameter(
             "transition", "m/s", "speed v_t over which the sign turns", bounds=(0.0, math.inf), default=1e-3
@@ -35,7 +38,7 @@ ELEMENT = Element(
     starts=lambda s: [
         {"force": 0.02 * s.force, "asymmetry": a, "transition": 0.1 * s.velocity} for a in (-0.5, 0.5)
     ],
-    ranges=lambda s: {"transition": s.turning},
+    ranges=lambda s: {"transition": s.turning, "asymmetry": ONE_SIDED},
     against="base",
     also_known_as=("direction-dependent dry friction",),
     family="friction",
