@@ -57,10 +57,13 @@ class Answer:
 
 @pytest.fixture
 def command(capsys, monkeypatch, tmp_path) -> Callable[..., Answer]:
-    """command("check", bag): the entry point of the command, called in `tmp_path`."""
+    """command("check", bag): the entry point of the command, called in `tmp_path` or in the folder `cwd`.
 
-    def call(*arguments: object) -> Answer:
-        monkeypatch.chdir(tmp_path)
+    It spares the start of a process, which takes about a second of the processor; `rhythmid` is for what a process proves.
+    """
+
+    def call(*arguments: object, cwd: Path = tmp_path) -> Answer:
+        monkeypatch.chdir(cwd)
         monkeypatch.setattr(sys, "argv", ["rhythmid", *map(str, arguments)])
         capsys.readouterr()
         with pytest.raises(SystemExit) as ended:
