@@ -62,6 +62,7 @@ def test_the_shipped_leg_lacks_nothing(tmp_path: Path, rate: int):
     assert diagnose_machine(shipped(tmp_path, leg(), rate), leg()).diagnosis.verdict == "consistent"
 
 
+@pytest.mark.long  # test_cli_legs names the same friction in the same leg, in the air
 def test_friction_that_is_concealed_in_the_shipped_leg_is_named(tmp_path: Path):
     friction = load_catalogue()["coulomb_friction"]
     rough = leg().with_element("knee", friction, {"force": 0.3, "transition": 0.02})
