@@ -38,12 +38,12 @@ $(VENV)/.warm: $(VENV)/.packages
 	@touch $@
 
 test: lint ## Run the linters and all tests but the long ones
-	@# folders with the longest files first, so that neither worker ends long after the other; a test that fails twice fails, one that
-	@# passes the second time is listed as RERUN
+	@# in the order of tests/conftest.py, the longest files first; a test that fails twice fails, one that passes the second time is
+	@# listed as RERUN
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --reruns 1 -r fEsxXR -m "not long" \
 		tests/proof tests/browser tests/faults tests/unit
 	@# what runs in real time has the machine to itself; much of it waits, so that two go side by side
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --reruns 1 -r fEsxXR tests/ros
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --reruns 1 -r fEsxXR -m "not long" tests/ros
 
 test-long: install ## Run the tests that `make test` leaves out because they take long
 	$(BIN)/python -m pytest --numprocesses 2 -m long tests

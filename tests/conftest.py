@@ -21,6 +21,16 @@ os.environ.setdefault(
 settings.register_profile("rhythmid", deadline=None, derandomize=True, database=None, max_examples=40)
 settings.load_profile("rhythmid")
 
+LONGEST = (  # files that take more than about twenty seconds of the processor
+    "ros/test_run.py", "ros/test_foreign_robot.py", "ros/test_tour.py", "ros/test_testing.py", "ros/test_realtime_delays.py",
+    "ros/test_workspace.py",
+    "proof/test_concealed.py", "proof/test_machines.py", "faults/test_diagnose_bad_input.py", "unit/test_element_recorded.py",
+    "unit/test_held_reference.py", "unit/test_cli_init.py", "faults/test_bad_input.py",
+    "unit/test_effort_search.py", "unit/test_link_mass.py", "unit/test_link_inertia.py",
+    "unit/test_weighting.py", "unit/test_inner_delays.py", "unit/test_tick_interval.py", "unit/test_twin_diagnosis.py",
+    "proof/test_notebooks.py", "proof/test_design_prediction.py", "unit/test_batch.py", "unit/test_budget.py",
+)  # fmt: skip
+
 Command = Callable[..., subprocess.CompletedProcess[str]]
 
 
@@ -30,6 +40,12 @@ def pytest_configure(config: pytest.Config) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(config, "cache", None) is not None:
         os.environ.setdefault("RHYTHMID_CACHE", str(config.cache.mkdir("compiled")))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the files that take longest, so that of two workers neither ends long after the other."""
+    places = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get("/".join(item.path.parts[-2:]), len(LONGEST)))
 
 
 @pytest.fixture
@@ -57,10 +73,13 @@ class Answer:
 
 @pytest.fixture
 def command(capsys, monkeypatch, tmp_path) -> Callable[..., Answer]:
-    """command("check", bag): the entry point of the command, called in `tmp_path`."""
+    """command("check", bag): the entry point of the command, called in `tmp_path` or in the folder `cwd`.
 
-    def call(*arguments: object) -> Answer:
-        monkeypatch.chdir(tmp_path)
+    It spares the start of a process, which takes about a second of the processor; `rhythmid` is for what a process proves.
+    """
+
+    def call(*arguments: object, cwd: Path = tmp_path) -> Answer:
+        monkeypatch.chdir(cwd)
         monkeypatch.setattr(sys, "argv", ["rhythmid", *map(str, arguments)])
         capsys.readouterr()
         with pytest.raises(SystemExit) as ended:

@@ -12,6 +12,7 @@ import pytest
 FOLDER = Path(__file__).parents[2] / "docs" / "notebooks"
 DATA = Path(os.environ.get("RHYTHMID_DATA") or Path(__file__).parents[3] / "shared" / "data")
 NOTEBOOKS = ("paper_hopper", "your_bag", "real_recording")
+LONG = {"real_recording": pytest.mark.long}  # a diagnosis of Silverbox, which test_silverbox makes too
 
 
 def as_script(notebook: Path) -> str:
@@ -31,7 +32,7 @@ def as_script(notebook: Path) -> str:
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("name", NOTEBOOKS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=LONG.get(name, ())) for name in NOTEBOOKS])
 def test_a_notebook_runs_to_its_end(name, tmp_path):
     if name == "real_recording" and not (DATA / "silverbox").is_dir():
         pytest.skip(f"the Silverbox data are not in {DATA}; set RHYTHMID_DATA")

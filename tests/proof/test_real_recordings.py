@@ -215,6 +215,8 @@ def pendulum_told(cases, tmp_path_factory) -> Told:
     return diagnosed(cases["pendulum untouched"], tmp_path_factory.mktemp("pendulum"))
 
 
+# test_real_bodies finds the same friction in the same recording, from a body and in less time
+@pytest.mark.long
 @present("pendulum")
 def test_friction_comes_first_in_a_frictionless_pendulum_and_its_inertia_is_found(pendulum_told):
     assert pendulum_told.names[0] in COULOMB_FAMILY
@@ -225,6 +227,7 @@ def test_friction_comes_first_in_a_frictionless_pendulum_and_its_inertia_is_foun
     assert pendulum_told.after < 0.5 * pendulum_told.before
 
 
+@pytest.mark.long
 @present("pendulum")
 def test_a_frictionless_pendulum_is_told_that_it_lacks_friction(pendulum_told):
     assert pendulum_told.verdict == "missing_physics" and sum(pendulum_told.probabilities[:1]) >= 0.8

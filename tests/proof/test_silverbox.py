@@ -1,6 +1,7 @@
 """A real recording: from a linear model only, the tool finds how Silverbox's input was sampled and what its spring does.
 
-The files are not part of the project (docs/silverbox.md says where they come from); without them these tests are skipped.
+The files are not part of the project (docs/silverbox.md says where they come from); without them these tests are skipped. What is
+asked of the diagnosis runs with `make test-long`.
 """
 
 import os
@@ -73,6 +74,7 @@ def answer(tmp_path_factory):
     return diagnose(records(folder, seen), Model.from_text(LINEAR), records(folder, unseen))
 
 
+@pytest.mark.long
 def test_a_held_input_is_reported_about_half_a_sample_late(answer):
     notes = " ".join(answer.diagnosis.calibration)
     assert "half a sample late when held" in notes
@@ -86,6 +88,7 @@ def test_the_input_is_left_alone_when_it_is_read_as_band_limited(tmp_path):
     assert abs(calibration.fit.model.value("input_delay.delay")) < 0.02 / RATE
 
 
+@pytest.mark.long
 def test_the_hardening_spring_is_named_and_measured(answer):
     result = answer.diagnosis
     assert result.verdict == "missing_physics"
@@ -98,6 +101,7 @@ def test_the_hardening_spring_is_named_and_measured(answer):
     assert result.location.slot == "force"
 
 
+@pytest.mark.long
 def test_decoys_are_rejected(answer):
     """What is named besides the cubic are corrections to spring and damper that the held-out tests confirm."""
     assert {effect.element for effect in answer.diagnosis.missing} <= {
@@ -105,6 +109,7 @@ def test_decoys_are_rejected(answer):
     }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "limit"),
     [
@@ -132,6 +137,7 @@ def test_the_augmented_model_runs_free_over_the_official_tests(answer, tmp_path,
     )
 
 
+@pytest.mark.long
 def test_the_augmented_model_can_be_saved_and_read_back(answer, tmp_path):
     answer.model.save(tmp_path / "augmented.yaml")
     assert Model.load(tmp_path / "augmented.yaml").value("cubic_stiffness.coefficient") > 3.0

@@ -11,7 +11,12 @@ pytestmark = pytest.mark.timeout(LONG)
 
 @pytest.mark.parametrize(
     ("effect", "command_type"),
-    [("nothing", "Float64MultiArray"), ("delay", "Float64"), ("floor", "JointState")],
+    [
+        ("nothing", "Float64MultiArray"),
+        # test_realtime_delays finds delays, and test_excitation speaks this type
+        pytest.param("delay", "Float64", marks=pytest.mark.long),
+        ("floor", "JointState"),
+    ],
 )
 def test_what_is_concealed_in_it_is_named_and_nothing_else(domain, tmp_path, effect, command_type):
     acted = record(tmp_path / "bag", EFFECTS[effect].parameters, LENGTH, command_type)

@@ -16,7 +16,7 @@ MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_
 DELAYS = {"input": 0.040, "measurement": 0.050}
 CLOSE = 0.3  # ms
 SURE = 3.0  # standard deviations, which a machine that starves the graph makes large
-SWEEP = 20.0  # s
+SWEEP = 12.0  # s
 pytestmark = pytest.mark.timeout(LONG)
 
 

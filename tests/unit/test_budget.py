@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from itertools import chain, repeat
 
 import pytest
@@ -23,6 +24,7 @@ from rhythmid.diagnose.search.trial import Trial
 from rhythmid.identify.descent import WHITE
 from rhythmid.identify.output_error import start_only
 from rhythmid.identify.series import prepare
+from rhythmid.record.record import Record
 
 FEW = ("coulomb_friction", "cubic_stiffness", "quadratic_drag")
 FRICTION = {"force": 0.02, "transition": 0.002}
@@ -39,9 +41,13 @@ def spent(monkeypatch: pytest.MonkeyPatch, *answers: bool) -> None:
     monkeypatch.setattr(Budget, "spent", property(lambda _: next(asked)))
 
 
+@cache
+def runs() -> list[Record]:
+    return records(hopper().with_element(CATALOGUE["coulomb_friction"], FRICTION), SHORT[:2])
+
+
 def by_motion() -> Diagnosis:
-    machine = hopper().with_element(CATALOGUE["coulomb_friction"], FRICTION)
-    return diagnose(records(machine, SHORT[:2]), hopper(), catalogue=only(*FEW)).diagnosis
+    return diagnose(runs(), hopper(), catalogue=only(*FEW)).diagnosis
 
 
 def by_effort() -> Diagnosis:

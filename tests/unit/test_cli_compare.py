@@ -33,12 +33,10 @@ def bags(tmp_path_factory):
     return folder
 
 
-def test_two_bags_are_enough(rhythmid, bags):
-    done = rhythmid(
-        "diagnose", "real", "--sim", "sim", "--json", "out.json", "--report", "out.html", cwd=bags
-    )
-    assert done.returncode == 0, done.stderr
-    assert "input delay" in " ".join(done.stdout.split())
+def test_two_bags_are_enough(command, bags):
+    done = command("diagnose", "real", "--sim", "sim", "--json", "out.json", "--report", "out.html", cwd=bags)
+    assert done.code == 0, done.err
+    assert "input delay" in " ".join(done.out.split())
     found = json.loads((bags / "out.json").read_text())["comparison"]
     assert found["slot"] == "command"
     assert found["explanations"][0]["parameters"]["delay"]["value"] == pytest.approx(0.02, abs=1e-3)
@@ -57,8 +55,8 @@ def test_two_bags_are_enough(rhythmid, bags):
         (("--sim", "nowhere"), "nowhere: no such file"),
     ],
 )
-def test_what_is_missing_is_said_in_one_line(rhythmid, bags, arguments, words):
-    done = rhythmid("diagnose", "real", *arguments, cwd=bags)
-    assert done.returncode == 2
-    assert words in done.stderr
-    assert done.stderr.count("error:") == 1
+def test_what_is_missing_is_said_in_one_line(command, bags, arguments, words):
+    done = command("diagnose", "real", *arguments, cwd=bags)
+    assert done.code == 2
+    assert words in done.err
+    assert done.err.count("error:") == 1

@@ -23,10 +23,10 @@ def folder(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def made(folder, rhythmid):
+def made(folder, command):
     """A design made once by the command, and what it printed."""
     if not (folder / "said").exists():
-        done = rhythmid(
+        done = command(
             "design",
             PAPER,
             *ARGUMENTS,
@@ -35,10 +35,9 @@ def made(folder, rhythmid):
             "--json",
             "out/plan.json",
             cwd=folder,
-            timeout=600.0,
         )
-        assert (done.returncode, done.stderr) == (0, ""), done.stderr
-        (folder / "said").write_text(done.stdout, encoding="utf-8")
+        assert (done.code, done.err) == (0, ""), done.err
+        (folder / "said").write_text(done.out, encoding="utf-8")
     return folder / "out" / "plan", (folder / "said").read_text(encoding="utf-8")
 
 
@@ -77,15 +76,15 @@ def test_every_free_parameter_and_both_delays_have_a_predicted_standard_deviatio
     assert result["distortion"]["even"] > result["distortion"]["odd"] > 0.0
 
 
-def test_the_example_in_the_documents_gives_what_they_show(rhythmid, tmp_path):
+def test_the_example_in_the_documents_gives_what_they_show(command, tmp_path):
     text = (Path(__file__).parents[2] / "docs" / "design.md").read_text(encoding="utf-8")
     shown = re.search(r"    rhythmid (design .*?)\n\n((?:    [┃│][^\n]*\n)+)", text, re.DOTALL)
     assert shown is not None
     (tmp_path / "paper_hopper.yaml").write_bytes(PAPER.read_bytes())
-    done = rhythmid(*shown[1].replace("\\\n", " ").split(), timeout=600.0)
-    assert done.returncode == 0, done.stderr
+    done = command(*shown[1].replace("\\\n", " ").split())
+    assert done.code == 0, done.err
     for line in shown[2].splitlines():
-        assert line.strip() in done.stdout
+        assert line.strip() in done.out
     result = json.loads((tmp_path / "plan" / "design.json").read_text())
     assert f"crest factor small: {result['amplitude']['crest_factor']:.2f} in the example" in text
     assert f"{result['distortion']['even']:.2%}".replace("%", " %") in text
@@ -106,12 +105,12 @@ def test_what_is_played_is_the_file_sample_by_sample(made):
     assert np.max(np.abs(effort)) <= experiment.safety.max_effort
 
 
-def test_simulating_and_identifying_the_design_gives_the_predicted_uncertainty(made, rhythmid):
+def test_simulating_and_identifying_the_design_gives_the_predicted_uncertainty(made, command):
     plan, _ = made
-    done = rhythmid("simulate", plan / "model.yaml", "--experiment", plan / "experiment.yaml", "--out", "bag")
-    assert done.returncode == 0, done.stderr
-    done = rhythmid("identify", "bag", "--model", plan / "model.yaml", "--json", plan.parent / "found.json")
-    assert done.returncode == 0, done.stderr
+    done = command("simulate", plan / "model.yaml", "--experiment", plan / "experiment.yaml", "--out", "bag")
+    assert done.code == 0, done.err
+    done = command("identify", "bag", "--model", plan / "model.yaml", "--json", plan.parent / "found.json")
+    assert done.code == 0, done.err
     predicted, found = (
         json.loads(path.read_text()) for path in (plan / "design.json", plan.parent / "found.json")
     )

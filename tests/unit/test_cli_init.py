@@ -32,16 +32,16 @@ def table(tmp_path):
     return path
 
 
-def test_the_readme_shows_the_commands_that_init_prints(table, rhythmid):
+def test_the_readme_shows_the_commands_that_init_prints(table, command):
     readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     section = readme.partition("\n## Only bags\n")[2].partition("\n## ")[0]
     shown = [line.split()[1:] for line in section.splitlines() if line.startswith("    rhythmid ")]
     assert [one[0] for one in shown] == ["init", "check", "diagnose"]
-    begun = rhythmid(*shown[0])
-    assert (begun.returncode, begun.stderr) == (0, "")
-    assert [
-        line.split()[1:] for line in begun.stdout.splitlines() if line.startswith("  rhythmid ")
-    ] == shown[1:]
+    begun = command(*shown[0])
+    assert (begun.code, begun.err) == (0, "")
+    assert [line.split()[1:] for line in begun.out.splitlines() if line.startswith("  rhythmid ")] == shown[
+        1:
+    ]
 
 
 @pytest.fixture
@@ -65,29 +65,29 @@ def bag(tmp_path):
 
 
 @pytest.mark.parametrize("recording", ["table", "bag"])
-def test_three_commands_lead_from_a_foreign_recording_to_a_verdict(recording, request, rhythmid):
+def test_three_commands_lead_from_a_foreign_recording_to_a_verdict(recording, request, command):
     source: Path = request.getfixturevalue(recording)
-    begun = rhythmid("init", source.name)
-    assert (begun.returncode, begun.stderr) == (0, "")
-    commands = [line.split()[1:] for line in begun.stdout.splitlines() if line.startswith("  rhythmid ")]
+    begun = command("init", source.name)
+    assert (begun.code, begun.err) == (0, "")
+    commands = [line.split()[1:] for line in begun.out.splitlines() if line.startswith("  rhythmid ")]
     assert [one[0] for one in commands] == ["check", "diagnose"]
-    checked = rhythmid(*commands[0])
-    assert checked.returncode == 0
-    assert all("clocks" in line for line in checked.stdout.splitlines() if "note" in line)
-    done = rhythmid(*commands[1], "--json", "answer.json", timeout=600.0)
-    assert done.returncode == 0, done.stderr
+    checked = command(*commands[0])
+    assert checked.code == 0
+    assert all("clocks" in line for line in checked.out.splitlines() if "note" in line)
+    done = command(*commands[1], "--json", "answer.json")
+    assert done.code == 0, done.err
     answer = json.loads((source.parent / "answer.json").read_text())
     assert answer["verdict"] == "missing_physics" and answer["missing"][0]["element"] == "coulomb_friction"
     found = answer["missing"][0]["parameters"]["force"]
     assert found["value"] == pytest.approx(DRY, abs=max(0.01, 3.0 * found["std"]))
 
 
-def test_files_that_exist_are_not_overwritten_unless_told_to(table, rhythmid):
+def test_files_that_exist_are_not_overwritten_unless_told_to(table, command):
     (table.parent / "model.yaml").write_text("mine")
-    refused = rhythmid("init", "run.csv")
-    assert refused.returncode == 2 and "model.yaml: exists already" in refused.stderr
-    assert refused.stderr.count("\n") == 1 and not (table.parent / "signals.yaml").exists()
-    assert rhythmid("init", "run.csv", "--force").returncode == 0
+    refused = command("init", "run.csv")
+    assert refused.code == 2 and "model.yaml: exists already" in refused.err
+    assert refused.err.count("\n") == 1 and not (table.parent / "signals.yaml").exists()
+    assert command("init", "run.csv", "--force").code == 0
     assert "inertia" in (table.parent / "model.yaml").read_text()
 
 
@@ -99,9 +99,9 @@ def test_files_that_exist_are_not_overwritten_unless_told_to(table, rhythmid):
         (("convert", "none.csv", "--out", "bag"), "none.csv: no such file"),
     ],
 )
-def test_what_cannot_be_done_is_refused_in_one_line(table, rhythmid, arguments, words):
-    refused = rhythmid(*arguments)
-    assert refused.returncode == 2 and words in refused.stderr and refused.stderr.count("\n") == 1
+def test_what_cannot_be_done_is_refused_in_one_line(table, command, arguments, words):
+    refused = command(*arguments)
+    assert refused.code == 2 and words in refused.err and refused.err.count("\n") == 1
     assert sorted(path.name for path in table.parent.iterdir()) == ["run.csv"]
 
 
@@ -120,14 +120,14 @@ def test_on_a_terminal_close_candidates_are_asked_for(tmp_path):
     assert "output: pos_right" in done.stdout
 
 
-def test_a_table_becomes_a_bag_with_the_guesses_or_with_signals_of_ones_own(table, rhythmid):
-    done = rhythmid("convert", "run.csv", "--out", "bag")
-    assert done.returncode == 0 and "output: angle [deg]" in done.stdout
+def test_a_table_becomes_a_bag_with_the_guesses_or_with_signals_of_ones_own(table, command):
+    done = command("convert", "run.csv", "--out", "bag")
+    assert done.code == 0 and "output: angle [deg]" in done.out
     (table.parent / "own.yaml").write_text(
         "time: {column: 't [ms]', scale: 0.001}\ninput: {column: 'tau [Nm]', unit: N*m}\n"
         "output: {column: 'angle [deg]', unit: rad, scale: 0.01745329252}\n"
     )
-    assert rhythmid("convert", "run.csv", "--out", "other", "--signals", "own.yaml").returncode == 0
+    assert command("convert", "run.csv", "--out", "other", "--signals", "own.yaml").code == 0
     expected = read_record(table, table.parent / "own.yaml")
     for name in ("bag", "other"):
         found = read_record(table.parent / name, table.parent / name / "signals.yaml")

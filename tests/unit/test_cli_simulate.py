@@ -59,41 +59,39 @@ def test_a_bag_is_written_that_holds_the_offline_run(folder, rhythmid):
         np.testing.assert_array_equal(values, first)
 
 
-def test_the_truth_is_recorded_only_on_request(folder, rhythmid):
-    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag", "--all-topics")
-    assert done.returncode == 0
+def test_the_truth_is_recorded_only_on_request(folder, command):
+    done = command("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag", "--all-topics")
+    assert done.code == 0
     assert {"/hopper/command", "/hopper/plant/joint_states"} <= set(recorded(folder / "bag"))
 
 
-def test_folders_above_a_result_are_made(folder, rhythmid):
-    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "out/of/bags/bag")
-    assert (done.returncode, done.stderr) == (0, "")
+def test_folders_above_a_result_are_made(folder, command):
+    done = command("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "out/of/bags/bag")
+    assert (done.code, done.err) == (0, "")
     assert recorded(folder / "out" / "of" / "bags" / "bag")
     checks = folder / "out" / "of" / "checks"
-    done = rhythmid(
-        "check", "out/of/bags/bag", "--json", checks / "bag.json", "--report", checks / "bag.html"
-    )
-    assert done.returncode == 2 and "less than one period of the forcing" in done.stderr
+    done = command("check", "out/of/bags/bag", "--json", checks / "bag.json", "--report", checks / "bag.html")
+    assert done.code == 2 and "less than one period of the forcing" in done.err
     assert {path.name for path in checks.iterdir()} == {"bag.json", "bag.html"}
     page = (checks / "bag.html").read_text(encoding="utf-8")
     assert "<h1>Not usable</h1>" in page and "less than one period of the forcing" in page
 
 
-def test_a_result_is_never_written_over(folder, rhythmid):
+def test_a_result_is_never_written_over(folder, command):
     (folder / "bag").mkdir()
     (folder / "bag" / "precious").write_text("data", encoding="utf-8")
-    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "error: bag: exists already; name another file or remove it\n"
+    done = command("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
+    assert (done.code, done.out) == (2, "")
+    assert done.err == "error: bag: exists already; name another file or remove it\n"
     assert [path.name for path in (folder / "bag").iterdir()] == ["precious"]
 
 
-def test_a_refused_run_leaves_nothing_behind(folder, rhythmid):
+def test_a_refused_run_leaves_nothing_behind(folder, command):
     (folder / "hopper.yaml").write_text("inertia: {mass: {value: 1000, unit: g}}", encoding="utf-8")
     before = sorted(path.name for path in folder.iterdir())
-    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
-    assert done.returncode == 2
-    assert done.stderr == (
+    done = command("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
+    assert done.code == 2
+    assert done.err == (
         "error: hopper.yaml:1: inertia.mass: unit 'g' where 'kg' is expected: write the value in kg (multiply it by 0.001)\n"
     )
     assert sorted(path.name for path in folder.iterdir()) == before
@@ -125,22 +123,22 @@ def test_bad_usage_is_one_line_and_exit_code_2(arguments, words, folder, refused
     assert not (folder / "bag").exists()
 
 
-def test_a_place_that_nobody_may_write_is_refused(folder, rhythmid):
-    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "/proc/bag")
-    assert done.returncode == 2
-    assert done.stderr.startswith("error: /proc/bag: ") and done.stderr.count("\n") == 1
+def test_a_place_that_nobody_may_write_is_refused(folder, command):
+    done = command("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "/proc/bag")
+    assert done.code == 2
+    assert done.err.startswith("error: /proc/bag: ") and done.err.count("\n") == 1
 
 
-def test_square_brackets_in_a_message_are_printed_as_they_are(folder, rhythmid):
+def test_square_brackets_in_a_message_are_printed_as_they_are(folder, command):
     (folder / "run.yaml").write_text(EXPERIMENT + "safety: {envelope: [1]}\n", encoding="utf-8")
-    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
-    assert "two numbers [low, high] are expected" in done.stderr
+    done = command("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
+    assert "two numbers [low, high] are expected" in done.err
 
 
-def test_help_and_version_are_answers(rhythmid):
-    assert rhythmid("--help").returncode == 0
-    version = rhythmid("--version")
-    assert (version.returncode, version.stdout) == (0, f"rhythmid {package.__version__}\n")
+def test_help_and_version_are_answers(command):
+    assert command("--help").code == 0
+    version = command("--version")
+    assert (version.code, version.out) == (0, f"rhythmid {package.__version__}\n")
 
 
 def test_compiled_models_that_cannot_be_kept_are_refused_with_what_to_do(folder, rhythmid):

@@ -1,6 +1,6 @@
 """An effect that needs another one: a drift of a spring of which the model has none."""
 
-from machines import CATALOGUE, only, records
+from machines import CATALOGUE, SHORT, only, records
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.model import Model
 
@@ -28,7 +28,7 @@ def test_a_model_is_pruned_of_an_effect_and_of_what_needs_it():
 
 
 def test_a_spring_that_drifts_is_found_where_the_model_has_neither():
-    runs = records(drifting(0.03), delays=(0.0, 0.0))
+    runs = records(drifting(0.03), SHORT[:2], delays=(0.0, 0.0))
     found = diagnose(
         runs, Model.from_text(MASS, catalogue=CATALOGUE), catalogue=only("linear_spring", "stiffness_drift")
     )

@@ -323,11 +323,11 @@ def test_no_source_can_break_a_file():
     ],
     ids=["units", "out", "no target"],
 )  # fmt: skip
-def test_bad_input_is_refused_in_one_line(tmp_path, rhythmid, text, arguments, says):
+def test_bad_input_is_refused_in_one_line(tmp_path, command, text, arguments, says):
     (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
-    done = rhythmid("export", "model.yaml", *arguments)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert says in done.stderr and done.stderr.count("\n") == 1
+    done = command("export", "model.yaml", *arguments)
+    assert (done.code, done.out) == (2, "")
+    assert says in done.err and done.err.count("\n") == 1
     assert [one.name for one in tmp_path.iterdir()] == ["model.yaml"]
 
 
@@ -344,10 +344,10 @@ def test_what_no_simulator_can_take_is_refused():
         exported([joint(LINEAR)], "gazebo")
 
 
-def test_the_command_writes_a_file_or_to_the_terminal(tmp_path, rhythmid):
+def test_the_command_writes_a_file_or_to_the_terminal(tmp_path, command):
     (tmp_path / "model.yaml").write_text(LINEAR, encoding="utf-8")
-    shown = rhythmid("export", "model.yaml", "--to", "mujoco", "--joint", "knee")
-    saved = rhythmid("export", "model.yaml", "--to", "mujoco", "--joint", "knee", "--out", "out/knee.xml")
-    assert (shown.returncode, saved.returncode, saved.stdout) == (0, 0, "out/knee.xml: knee for mujoco\n")
-    assert (tmp_path / "out/knee.xml").read_text(encoding="utf-8") == shown.stdout
+    shown = command("export", "model.yaml", "--to", "mujoco", "--joint", "knee")
+    saved = command("export", "model.yaml", "--to", "mujoco", "--joint", "knee", "--out", "out/knee.xml")
+    assert (shown.code, saved.code, saved.out) == (0, 0, "out/knee.xml: knee for mujoco\n")
+    assert (tmp_path / "out/knee.xml").read_text(encoding="utf-8") == shown.out
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "out/knee.xml")).nu == 1

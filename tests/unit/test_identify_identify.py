@@ -62,7 +62,7 @@ def test_the_assumption_on_the_forcing_is_stated(found, paper_record) -> None:
 
 
 def test_without_forcing_only_the_sum_is_given(paper_record) -> None:
-    blind = replace(paper_record(), forcing=None)
+    blind = replace(paper_record(), forcing=None).cut(0.0, 90.0)  # a smooth machine needs no shifted sweeps
     smooth = paper_hopper().with_values({"switched_damper.stance": 1.0, "switched_damper.flight": 1.0})
     delays = identify(blind, smooth, method="paper").delays
     assert delays.separable is False

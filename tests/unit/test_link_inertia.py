@@ -112,7 +112,9 @@ def named(answer: MachineAnswer) -> dict[str, tuple[str, str | None]]:
     return {one.joint: (one.element, one.link) for one in answer.diagnosis.missing}
 
 
-@pytest.mark.parametrize("share", [0.3, 2.4], ids=["lighter", "heavier"])
+@pytest.mark.parametrize(
+    "share", [pytest.param(0.3, id="lighter", marks=pytest.mark.long), pytest.param(2.4, id="heavier")]
+)
 def test_a_links_wrong_inertia_is_named_with_its_value_and_the_files(leg: Machine, share: float):
     known = leg.body.parameters["shank.inertia"]
     answer = diagnose_machine([swung(leg.with_inertial({"shank.inertia": share * known}))], leg)

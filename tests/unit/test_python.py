@@ -142,16 +142,16 @@ def test_an_experiment_may_hold_numpy_values_and_nothing_that_is_no_value():
         rh.simulate(Model.from_text(OSCILLATOR), {"exitation": {}})
 
 
-def test_command_and_function_give_the_same_answer(run, found, tmp_path, rhythmid):
+def test_command_and_function_give_the_same_answer(run, found, tmp_path, command):
     run.save(tmp_path / "bag")
     guess = Model.from_text(OSCILLATOR).with_values({"linear_spring.stiffness": 180.0})
     guess.save(tmp_path / "model.yaml")
-    done = rhythmid("identify", "bag", "--model", "model.yaml", "--json", "-")
+    done = command("identify", "bag", "--model", "model.yaml", "--json", "-")
     write_json(tmp_path / "found.json", found.to_dict())
     ours = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))
-    theirs = json.loads(done.stdout)
+    theirs = json.loads(done.out)
     assert theirs["parameters"] == ours["parameters"] and theirs["covariance"] == ours["covariance"]
-    assert found.summary(80).splitlines()[-1] == done.stderr.splitlines()[-1]
+    assert found.summary(80).splitlines()[-1] == done.err.splitlines()[-1]
 
 
 def test_a_result_tells_tabulates_and_draws_itself(found, axis):

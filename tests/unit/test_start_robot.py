@@ -67,15 +67,15 @@ def table(path: Path, run: dict[str, np.ndarray], heads: list[str], *what: str) 
     return path
 
 
-def test_a_robots_log_leads_to_the_joint_and_the_physics_that_its_file_lacks(tmp_path, robot, run, rhythmid):
+def test_a_robots_log_leads_to_the_joint_and_the_physics_that_its_file_lacks(tmp_path, robot, run, command):
     heads = [f"{kind}_{joint}" for kind in ("ref", "q", "tau") for joint in ("shoulder", "elbow")]
     table(tmp_path / "run.csv", run, heads, "asked", "position", "effort")
-    said = rhythmid("init", "run.csv", "--body", "arm.urdf")
-    assert (said.returncode, said.stderr) == (0, "")
-    assert "CHECK held at zero, because not recorded: finger_joint" in said.stdout
-    for line in [one.split()[1:] for one in said.stdout.splitlines() if one.startswith("  rhythmid ")]:
-        done = rhythmid(*line, *(["--json", "answer.json"] if line[0] == "diagnose" else []))
-        assert done.returncode == 0
+    said = command("init", "run.csv", "--body", "arm.urdf")
+    assert (said.code, said.err) == (0, "")
+    assert "CHECK held at zero, because not recorded: finger_joint" in said.out
+    for line in [one.split()[1:] for one in said.out.splitlines() if one.startswith("  rhythmid ")]:
+        done = command(*line, *(["--json", "answer.json"] if line[0] == "diagnose" else []))
+        assert done.code == 0
     answer = json.loads((tmp_path / "answer.json").read_text())
     assert [(one["joint"], one["element"]) for one in answer["missing"]][:1] == [
         ("elbow_joint", "soft_constraint_friction")
@@ -184,15 +184,15 @@ def test_references_alone_get_controllers_whose_gains_are_to_be_checked(tmp_path
     assert machine.paths["elbow_joint"].units == ROTATIONAL
 
 
-def test_a_log_without_joints_or_without_what_drives_them_is_refused(tmp_path, robot, run, rhythmid):
+def test_a_log_without_joints_or_without_what_drives_them_is_refused(tmp_path, robot, run, command):
     table(tmp_path / "run.csv", run, ["x_shoulder", "x_elbow"], "position")
     with pytest.raises(InputError, match="neither efforts nor references of shoulder, elbow"):
         begun(tmp_path / "run.csv", robot)
     table(tmp_path / "run.csv", run, ["torque", "current"], "effort")
     with pytest.raises(InputError, match="no measured position of a joint of arm.urdf"):
         begun(tmp_path / "run.csv", robot)
-    done = rhythmid("init", "run.csv", "--body", "arm.urdf", "--joint", "elbow")
-    assert (done.returncode, done.stderr.strip()) == (
+    done = command("init", "run.csv", "--body", "arm.urdf", "--joint", "elbow")
+    assert (done.code, done.err.strip()) == (
         2, "error: --joint is one joint, --body are all of a robot; give one of the two",
     )  # fmt: skip
     assert not (tmp_path / "signals.yaml").exists()

@@ -132,13 +132,13 @@ def test_several_recordings_are_checked_one_after_the_other_and_listed_as_json(b
     assert left["path"] == str(bag)
 
 
-def test_quiet_prints_errors_only(bag, rhythmid, tmp_path):
-    done = rhythmid("check", bag, "-q", "--json", "-", "--report", "page.html")
-    assert done.returncode == 0 and json.loads(done.stdout)["topics"] and done.stderr == ""
+def test_quiet_prints_errors_only(bag, command, tmp_path):
+    done = command("check", bag, "-q", "--json", "-", "--report", "page.html")
+    assert done.code == 0 and json.loads(done.out)["topics"] and done.err == ""
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "<h1>Usable" in page and page.count('<script type="application/json">') >= 2
-    refused = rhythmid("check", "nothing", "-q")
-    assert refused.returncode == 2 and refused.stderr.startswith("error: ")
+    refused = command("check", "nothing", "-q")
+    assert refused.code == 2 and refused.err.startswith("error: ")
 
 
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name != "run"])

@@ -1,6 +1,7 @@
 """Measurements that are held back and come in bursts leave what goes with the motion: the fit is not weighted by its colour then."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -32,24 +33,30 @@ def recorded(seed: int, held: float) -> Record:
     return replace(record, output=replace(record.output, time=stamps))
 
 
-def weighted_by_colour(record: Record) -> Fit:
+@cache
+def given_of(seed: int, held: float) -> Fit:
+    """The fit that is given for such a record."""
+    return best_fit(recorded(seed, held), paper_hopper()).fit
+
+
+@cache
+def weighted_by_colour(seed: int, held: float) -> Fit:
     """The fit that is weighted by the colour of what ordinary least squares leaves, whatever that is."""
-    fit = best_fit(record, paper_hopper()).fit
+    fit = given_of(seed, held)
     colour = noise_of(fit.residuals, fit.run.series)
     assert colour.order > 0
     return minimise(fit.model, fit.run, fit.names, colour, fit.starts)
 
 
 def test_noise_that_is_added_to_the_output_is_weighted_by_its_colour() -> None:
-    fit = best_fit(recorded(1, 0.0), paper_hopper()).fit
+    fit = given_of(1, 0.0)
     assert efficient_fit(fit).values.tolist() == fit.values.tolist()
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_what_comes_in_bursts_is_not_and_the_intervals_hold_the_truth(seed: int) -> None:
-    record = recorded(seed, 0.06)
     true = {"linear_spring.stiffness": 200.0, "switched_damper.stance": 2.0, "input_delay.delay": 0.04}
-    found = weighted_by_colour(record)
+    found = weighted_by_colour(seed, 0.06)
     weighted = with_robust_covariance(found)
     told = efficient_fit(found)
     for fit, holds in ((told, True), (weighted, False)):
@@ -59,10 +66,9 @@ def test_what_comes_in_bursts_is_not_and_the_intervals_hold_the_truth(seed: int)
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_fit_whose_weights_give_up_the_motion_is_not_given(seed: int) -> None:
-    record = recorded(seed, 0.06)
-    given = best_fit(record, paper_hopper()).fit
+    given = given_of(seed, 0.06)
     assert given.noise.order == 0
-    assert weighted_by_colour(record).nrmse() > MISLED * given.nrmse()
+    assert weighted_by_colour(seed, 0.06).nrmse() > MISLED * given.nrmse()
     assert given.model.value("linear_spring.stiffness") == pytest.approx(200.0, abs=2.0)
 
 

@@ -22,6 +22,7 @@ from rhythmid.identify.sensitivity import Linearisation, Problem, state_update
 from rhythmid.identify.series import dominant_frequency
 from rhythmid.identify.start_memory import sought
 from rhythmid.model import Model
+from rhythmid.value import Prior
 
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, float] = MappingProxyType({})
@@ -109,6 +110,26 @@ def _step(
     return step
 
 
+def _with_priors(here: Linearisation, priors: Sequence[Prior | None], values: Array) -> tuple[Array, Array]:
+    """Jacobian (n + k, p) and residual (n + k,) with one more row for each of the k priors."""
+    known = [(i, prior) for i, prior in enumerate(priors) if prior is not None]
+    if not known:
+        return here.jacobian, here.residual
+    extra: Array = np.zeros((len(known), len(values)))
+    for row, (i, prior) in enumerate(known):
+        extra[row, i] = 1.0 / prior.std
+    distance = [(values[i] - prior.mean) / prior.std for i, prior in known]
+    return np.vstack([here.jacobian, extra]), np.concatenate([here.residual, distance])
+
+
+def _within(
+    jacobian: Array, residual: Array, damping: float, blocked: NDArray[np.bool_], least: Array, most: Array
+) -> tuple[Array, bool]:
+    """The step (p,) of `_step`, and whether it stops nowhere."""
+    step = _step(jacobian, residual, damping, blocked, least, most)
+    return step, bool(np.all(blocked | ((step > least) & (step < most))))
+
+
 @dataclass(frozen=True)
 class Descent:
     """End of a search for the best parameters: the content of a `Fit`, without the sensitivities there.
@@ -152,7 +173,7 @@ def descend(
     InputError when the model diverges at its initial values.
     """
     problem = Problem(run, names, noise, pool)
-    current = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]
+    current: list[Array] = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]
     problem.learn_hidden(model, current)
     residuals = problem.residuals(model, current)
     cost = problem.cost(model, residuals, current)
@@ -164,13 +185,13 @@ def descend(
         steps, state_steps = _settled_steps(problem, model, current, residuals, similar)
     else:
         steps, state_steps = differences
-    held = np.array([float(place in run.compiled.layout.memories) for place in range(run.states)])
+    held: Array = np.array([float(place in run.compiled.layout.memories) for place in range(run.states)])
     damping, converged, searched = LEAST_DAMPING, False, not held.any()
-    low = np.array([model.parameters[name].bounds[0] for name in names])
-    high = np.array([model.parameters[name].bounds[1] for name in names])
+    low: Array = np.array([model.parameters[name].bounds[0] for name in names])
+    high: Array = np.array([model.parameters[name].bounds[1] for name in names])
     brink = [a + BRINK * (model.value(n) - a) if math.isfinite(a) else math.inf for n, a in zip(names, low)]
     priors = [model.parameters[name].prior for name in names]
-    blocked = np.zeros(len(names), bool)
+    blocked: NDArray[np.bool_] = np.zeros(len(names), bool)
     here: Linearisation | None = None
     samples = sum(len(problem.whitened(i, r)) for i, r in enumerate(residuals))
     costs = [cost]
@@ -182,29 +203,21 @@ def descend(
         here, states, steps, state_steps_next = problem.linearise(
             model, current, residuals, steps, state_steps
         )
-        jacobian, residual = here.jacobian, here.residual
-        values = np.array([model.value(name) for name in names])
-        weight = [(i, prior) for i, prior in enumerate(priors) if prior is not None]
-        if weight:
-            extra = np.zeros((len(weight), len(names)))
-            for row, (i, prior) in enumerate(weight):
-                extra[row, i] = 1.0 / prior.std
-            jacobian = np.vstack([jacobian, extra])
-            residual = np.concatenate(
-                [residual, [(values[i] - prior.mean) / prior.std for i, prior in weight]]
-            )
+        values: Array = np.array([model.value(name) for name in names])
+        jacobian, residual = _with_priors(here, priors, values)
         gradient = jacobian.T @ residual
         blocked = ((values <= low) & (gradient > 0)) | ((values >= high) & (gradient < 0))
         improved = cut = False
         for _ in range(12):
-            floor = np.array([a + STAY * (v - a) if v > b else a for v, a, b in zip(values, low, brink)])
-            least, most = floor - values, high - values
-            step = _step(jacobian, residual, damping, blocked, least, most)
-            whole = bool(np.all(blocked | ((step > least) & (step < most))))
-            proposed = np.clip(values + step, floor, high)
-            step = proposed - values
+            floor: Array = np.array(
+                [a + STAY * (v - a) if v > b else a for v, a, b in zip(values, low, brink)]
+            )
+            taken, whole = _within(jacobian, residual, damping, blocked, floor - values, high - values)
+            proposed: Array = np.clip(values + taken, floor, high)
+            step: Array = proposed - values
             trial = model.with_values(dict(zip(names, proposed)))
-            moved, promised = [], _prior_cost(priors, proposed)
+            moved: list[Array] = []
+            promised: float = _prior_cost(priors, proposed)
             for start, (error, slope, state) in zip(current, states):
                 ahead = error + slope @ step
                 # the other states are damped only where damping of parameters and memory states did not help

@@ -167,16 +167,17 @@ def fit_effort(
     alignment = min(max(alignment, aligned.low), aligned.high)
     residual, jacobian = linearise(balance, model, names, alignment)
     known = {**priors_of(balance, model, names, jacobian[:, 1:]), **(priors or {})}
-    mean = np.array([aligned.mean, *(known[name].mean for name in names)])
-    precision = np.array([aligned.std**-2, *(known[name].std ** -2 for name in names)])
+    mean: Array = np.array([aligned.mean, *(known[name].mean for name in names)])
+    precision: Array = np.array([aligned.std**-2, *(known[name].std ** -2 for name in names)])
     bounds = [(aligned.low, aligned.high), *(model.parameters[name].bounds for name in names)]
     for place, name in enumerate(names, start=1):
         if _divides(model, name):
             bounds[place] = (max(bounds[place][0], LEAST_INERTIA * known[name].mean), bounds[place][1])
-    low, high = (np.array(side) for side in zip(*bounds, strict=True))
-    value = np.array([alignment, *(model.value(name) for name in names)])
+    low: Array = np.array([least for least, _ in bounds])
+    high: Array = np.array([most for _, most in bounds])
+    value: Array = np.array([alignment, *(model.value(name) for name in names)])
 
-    divides = np.array([False, *(_divides(model, name) for name in names)])
+    divides: NDArray[np.bool_] = np.array([False, *(_divides(model, name) for name in names)])
 
     def cost(error: Array, at: Array, scale: float) -> float:
         return cost_of(error, scale) + 0.5 * float(precision @ (at - mean) ** 2)
@@ -186,13 +187,13 @@ def fit_effort(
             break
         scale = scale_of(residual)
         before = cost(residual, value, scale)
-        nearest = np.where(divides, np.maximum(low, value / SHRINKS), low)
+        nearest: Array = np.where(divides, np.maximum(low, value / SHRINKS), low)
         step = _step(residual, jacobian, precision, value, mean, nearest, high, scale)
         share, improved = 1.0, False
         for _ in range(HALVINGS):
-            trial = np.clip(value + share * step, low, high)
+            trial: Array = np.clip(value + share * step, low, high)
             moved = model.with_values(dict(zip(names, trial[1:].tolist(), strict=True)))
-            error = balance.predicted(moved, float(trial[0])) - balance.measured
+            error: Array = balance.predicted(moved, float(trial[0])) - balance.measured
             if np.isfinite(error).all() and cost(error, trial, scale) < before:
                 improved = True
                 break
@@ -231,7 +232,8 @@ def _step(
     weight = weights_of(residual, scale) / scale**2
     normal = (jacobian * weight[:, None]).T @ jacobian + np.diag(precision)
     slope = jacobian.T @ (weight * residual) + precision * (value - mean)
-    step, free = np.zeros(len(value)), np.ones(len(value), bool)
+    step: Array = np.zeros(len(value))
+    free: NDArray[np.bool_] = np.ones(len(value), bool)
     for _ in range(len(value)):
         if not free.any():
             break
@@ -241,7 +243,7 @@ def _step(
         step[free] = (
             -scaling * np.linalg.lstsq(part * np.outer(scaling, scaling), scaling * rest, rcond=1e-12)[0]
         )
-        outside = free & ((value + step < low) | (value + step > high))
+        outside: NDArray[np.bool_] = free & ((value + step < low) | (value + step > high))
         if not outside.any():
             break
         step[outside] = np.clip(value[outside] + step[outside], low[outside], high[outside]) - value[outside]
