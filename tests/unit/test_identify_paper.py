@@ -74,7 +74,9 @@ def test_a_quasi_static_machine_without_a_spring_is_told_what_it_lacks() -> None
 
 
 def test_a_period_map_whose_differences_overflow_says_that_the_model_diverges() -> None:
-    map_ = PeriodMap(Model.from_text(QUASI_STATIC), Pumping.cosine(0.0, 2.0), "force", 2.5e-3)  # too long steps
+    map_ = PeriodMap(
+        Model.from_text(QUASI_STATIC), Pumping.cosine(0.0, 2.0), "force", 2.5e-3
+    )  # too long steps
     with pytest.raises(InputError, match="diverges"):
         map_.jacobian(np.zeros(2), np.full(2, 1e-9))
 
