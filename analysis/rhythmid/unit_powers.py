@@ -1,17 +1,18 @@
 """Units as products of powers: rad/s^2*s^2/rad is 1.
 
-A library of units takes half a second to import, and refuses units that it does not know, such as px or duty.
+A library of units takes half a second to import, and refuses units that it does not know, such as px, duty or %.
 """
 
 import re
 from collections.abc import Iterator
 
-TOKEN = re.compile(r"([^\W\d_]+|1)(?:\^(-?\d+))?|([*/()](?!\^))")
+NAME = r"[^\W\d_]+|%"
+TOKEN = re.compile(rf"({NAME}|1)(?:\^(-?\d+))?|([*/()](?!\^))")
 
 
 def reduced(unit: str) -> str:
     """The unit with every name only once. A text that is not a product of powers is returned unchanged."""
-    names = re.findall(r"[^\W\d_]+", unit)
+    names = re.findall(NAME, unit)
     powers = _powers(unit)
     if powers is None or len(set(names)) == len(names):
         return unit

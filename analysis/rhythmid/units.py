@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from rhythmid.errors import InputError
+from rhythmid.record.heading import NOT_SI
 from rhythmid.unit_powers import reduced
 
 
@@ -68,6 +69,15 @@ class Units:
 def mass_unit(force: str, position: str) -> str:
     """The unit of an inertia: that of force divided by that of acceleration."""
     return reduced(f"{force}*s^2/{position}")
+
+
+def multiple_of_si(unit: str) -> tuple[float, str] | None:
+    """Factor and SI unit of a multiple of an SI unit, such as mm or deg; None for any other unit.
+
+    A machine's own unit is no multiple of one: V, px, duty, and also %, the share of a whole that no unit states.
+    """
+    found = NOT_SI.get(unit)
+    return None if found is None or found[1] == "1" else found
 
 
 TRANSLATIONAL = Units()

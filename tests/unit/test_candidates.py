@@ -4,14 +4,18 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from rhythmid.elements.candidates import IDLE, candidates
+from rhythmid.elements.candidates import IDLE, LEVEL, STEADY, candidates
 from rhythmid.elements.catalogue import load_catalogue, load_element
 from rhythmid.elements.element import Element, Parameter, Scales
 from rhythmid.elements.first_guess import NoGuess
 from rhythmid.errors import InputError
+from rhythmid.identify.record_scales import scales as scales_of
+from rhythmid.identify.series import prepare
 from rhythmid.model import Model
+from rhythmid.record.record import Channel, Record
 
 CATALOGUE = load_catalogue()
 SPRING = (
@@ -109,6 +113,48 @@ def test_a_machine_that_nothing_drives_lacks_no_command_no_actuator_and_no_other
         for element, _ in driven.tried
         if element.slot in ("command", "actuator", "timing") or element.name == "load_dependent_friction"
     }
+
+
+DRIFTS = {"actuator_fade", "clock_skew", "delay_drift", "input_delay_drift"}
+STATIC = {"actuator_nonlinearity", "actuator_saturation", "actuator_deadband", "torque_speed_limit"}
+DYNAMIC = {"command_hold", "command_lag", "actuator_lag", "actuator_rate_limit", "backlash"}
+
+
+def test_constant_levels_show_static_laws_of_the_actuator_a_step_delays_too_and_neither_a_clock_or_a_fade(
+    scales,
+):
+    setting = Model.from_text("inertia: {mass: 1.0}").setting
+    levels = candidates(CATALOGUE, setting, replace(scales, changes=0))
+    step = candidates(CATALOGUE, setting, replace(scales, changes=1))
+    often = {element.name for element, _ in candidates(CATALOGUE, setting, scales).tried}
+    assert {name for name, reason in step.not_tried.items() if reason == STEADY} == DRIFTS & often
+    assert often - {element.name for element, _ in step.tried} == DRIFTS & often
+    assert DYNAMIC & often <= {name for name, reason in levels.not_tried.items() if reason == LEVEL}
+    assert STATIC & often == STATIC & {element.name for element, _ in levels.tried} != set()
+
+
+def test_under_a_controller_a_fade_shows_although_its_reference_never_changes(scales):
+    model = Model.from_text(
+        "inertia: {mass: 1.0}\ncommand: [position_control: {proportional: 10.0, derivative: 2.0}]"
+    )
+    steady = candidates(CATALOGUE, model.setting, replace(scales, changes=1))
+    assert "actuator_fade" in {element.name for element, _ in steady.tried}
+    assert steady.not_tried["clock_skew"] == STEADY
+
+
+@pytest.mark.parametrize(("speed", "changes"), [(0.0, 1), (1.0, 0)], ids=["from rest", "running"])
+def test_a_constant_input_counts_as_a_change_where_the_machine_starts_from_rest(speed, changes):
+    time = np.arange(0.0, 3.0, 0.05)
+    records = [
+        Record(f"{u} V", Channel(time, u * (1.0 - (1.0 - speed) * np.exp(-time / 0.3)), "rad/s"),
+               Channel(time, np.full(len(time), u), "V"), output_kind="velocity", hold="zero")
+        for u in (3.0, 6.0)
+    ]  # fmt: skip
+    model = Model.from_text(
+        "units: {force: V, position: rad}\ninertia: {mass: 0.3}\nforce: [viscous_damper: {damping: 1.0}]"
+    )
+    found = scales_of(prepare(records), model)
+    assert (found.changes, found.idle) == (changes, False)
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,16 @@ def test_a_prior_adds_its_information():
     assert covariance_of(jacobian, [Prior(0.0, 0.125)])[0, 0] == pytest.approx(1.0 / (36.0 + 64.0))
 
 
+@pytest.mark.parametrize("seen", [0.0, 1e-14])
+def test_a_prior_of_what_the_records_do_not_show_leaves_the_others_as_uncertain_as_they_are(seen):
+    rng = np.random.default_rng(5)
+    others = rng.standard_normal((50, 2)) * [40.0, 5000.0]
+    jacobian = np.column_stack([others, np.full(50, seen)])
+    found = covariance_of(jacobian, [None, None, Prior(0.0, 0.02)])
+    assert found[:2, :2] == pytest.approx(covariance_of(others, [None, None]), rel=1e-9)
+    assert found[2, 2] == pytest.approx(0.02**2)
+
+
 def test_only_parameters_that_take_part_in_an_undetermined_direction_are_undetermined():
     one, other = np.random.default_rng(2).standard_normal((2, 60))
     variances = np.diag(covariance_of(np.column_stack([one, one, other]), [None] * 3))

@@ -1,5 +1,6 @@
 """Delays as a diagnosis gives them: what the records do not determine has no standard deviation."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -9,6 +10,7 @@ import pytest
 from machines import hopper
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.identify.output_error import Fit
+from rhythmid.value import Prior
 
 NAMES = ("input_delay.delay", "measurement_delay.delay")
 
@@ -28,6 +30,14 @@ def test_delays_that_nothing_determines_have_no_standard_deviation():
     assert found["measurement"] == {"value": 0.015, "std": None, "unit": "s"}
     assert found["sum"] == {"value": pytest.approx(0.035), "std": None, "unit": "s"}
     assert found["separable"] is False
+
+
+def test_a_delay_that_only_repeats_its_prior_is_not_determined():
+    fit = fit_with([[4e-4, 0.0], [0.0, 9e-8]])
+    prior = Prior(0.0, 0.02)
+    late = {name: replace(fit.model.parameters[name], prior=prior) for name in NAMES}
+    found = delays_of(cast(Fit, SimpleNamespace(**vars(fit) | {"model": fit.model.with_parameters(late)})))
+    assert (found["input"]["std"], found["measurement"]["std"]) == (None, pytest.approx(3e-4))
 
 
 def test_delays_that_are_determined_have_theirs_and_their_sum_s():

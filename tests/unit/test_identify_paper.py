@@ -10,8 +10,11 @@ from rhythmid.identify.delay_fit import fit_delays
 from rhythmid.identify.magnitude_fit import fit_magnitude, undelayed_parameters
 from rhythmid.identify.paper import PaperResult, paper_method
 from rhythmid.ltp.htf import HarmonicTransferFunctions, delay_phase
-from rhythmid.ltp.pumping import pumping_of
+from rhythmid.ltp.limit_cycle import PeriodMap
+from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.ltp.regularised_least_squares import HtfEstimate
+from rhythmid.model import Model
+from rhythmid.record.record import Channel, Record
 
 PAIRS = [(0.0, 0.0), (0.04, 0.05), (0.08, 0.1)]
 
@@ -53,6 +56,29 @@ def test_delays_are_found_from_each_harmonic_alone(found, pair) -> None:
         assert delays[m].input == pytest.approx(pair[0], abs=0.6e-3)
         assert delays[m].measurement == pytest.approx(pair[1], abs=0.6e-3)
         assert min(delays[m].input, delays[m].measurement) >= 0.0
+
+
+QUASI_STATIC = """
+inertia: {mass: {value: 20.0, unit: kg}}
+force:
+  - viscous_damper: {damping: {value: 50000.0, unit: N*s/m}}
+"""  # a ring-down of 0.4 ms beside a motion of 2 s, and no spring
+
+
+def test_a_quasi_static_machine_without_a_spring_is_told_what_it_lacks() -> None:
+    time = np.arange(0.0, 8.0, 1e-2)
+    push = np.cos(np.pi * time)
+    record = Record("slip", Channel(time, push / np.pi / 50000.0, "m"), Channel(time, push, "N"))
+    with pytest.raises(InputError, match="nothing restores its position"):
+        paper_method(record, Model.from_text(QUASI_STATIC), Pumping.cosine(0.0, 0.5), 0)
+
+
+def test_a_period_map_whose_differences_overflow_says_that_the_model_diverges() -> None:
+    map_ = PeriodMap(
+        Model.from_text(QUASI_STATIC), Pumping.cosine(0.0, 2.0), "force", 2.5e-3
+    )  # too long steps
+    with pytest.raises(InputError, match="diverges"):
+        map_.jacobian(np.zeros(2), np.full(2, 1e-9))
 
 
 def test_the_peak_lost_by_smoothing_is_reported(found) -> None:

@@ -51,6 +51,13 @@ def test_a_record_too_short_for_the_window_is_smoothed_over_the_whole_band() -> 
     assert np.isfinite(estimate.htf.std).all() and estimate.htf.std.shape == estimate.htf.value.shape
 
 
+def test_a_machine_faster_than_the_band_resolves_is_smoothed_over_the_shortest_time_of_the_band() -> None:
+    made = small(np.random.default_rng(4))
+    operator = regularised_least_squares(made, 1, ring_down=0.0)  # its rest after one period underflows
+    assert operator.window == pytest.approx(0.5 / made.band[1])
+    assert np.isfinite(estimate_htf(operator).htf.value).all()
+
+
 def test_estimates_of_a_real_system_have_conjugate_symmetry() -> None:
     operator = regularised_least_squares(small(np.random.default_rng(3)), 2, window=5.0)
     found = operator.solve(operator.spectra.output_at(operator.bins))

@@ -124,6 +124,22 @@ def test_what_is_not_clipped_is_not_called_so(seed):
 
 
 @given(seed=seeds)
+def test_a_standstill_after_a_short_jump_that_the_motion_then_leaves_is_no_clipping(seed):
+    rng = np.random.default_rng(seed)
+    back = np.array([-0.4, -0.8]) * rng.uniform(0.5, 2.0)
+    away = back[1] + np.cumsum([0.26, *np.full(500, 0.5)])  # as fast at once as a motor without load
+    value = np.concatenate([np.zeros(200), back, np.full(rng.integers(5, 12), back[1]), away])
+    assert clipped(value) == 0
+
+
+@given(seed=seeds)
+def test_a_rounded_speed_that_drops_a_count_now_and_then_is_no_clipping(seed):
+    value = np.full(600, 52.36)
+    value[np.random.default_rng(seed).integers(12, 18, 40).cumsum() % 600] = 47.12
+    assert clipped(np.concatenate([np.zeros(300), [20.0, 40.0], value, [31.0], np.zeros(300)])) == 0
+
+
+@given(seed=seeds)
 def test_a_machine_that_rests_on_many_levels_is_not_clipped_on_its_outermost_ones(seed):
     rng = np.random.default_rng(seed)
     levels = np.round(rng.uniform(0.0, 10.0, 12), 5)

@@ -52,3 +52,26 @@ def test_an_effort_that_changes_comes_before_a_set_point_that_does_not(tmp_path)
         tmp_path, speed_ref=np.full(len(TIME), 100.0), speed=95.0 * RISE + NOISE, torque=np.exp(-TIME / 0.3)
     )
     assert str(guess(path).roles.choices["input"].recorded) == "torque"
+
+
+def test_of_several_angles_the_one_that_goes_to_the_set_point_is_measured(tmp_path):
+    columns = {
+        "Consigne Angle (°)": np.full(len(TIME), 55.0),
+        "Position Angulaire X (°)": 2.8 + 52.2 * RISE + 0.3 * NOISE,
+        "Position Angulaire Y (°)": -126.0 + 122.0 * RISE + NOISE,
+    }
+    roles = guess(log(tmp_path, **columns)).roles
+    assert {role: str(one.recorded) for role, one in roles.choices.items()} == {
+        "input": "Consigne Angle (°)",
+        "output": "Position Angulaire X (°)",
+    }
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["Erreur I (°)", "error_deg", "Regelabweichung (deg)", "integral (deg)", "I-Term (deg)", "pos_err (deg)"],
+)
+def test_what_a_controller_computes_is_no_measured_position(tmp_path, name):
+    error = 52.0 - 52.0 * RISE
+    columns = {"Position (deg)": 52.0 - error + 0.1 * NOISE, name: np.cumsum(error)}
+    assert str(guess(log(tmp_path, **columns)).roles.choices["output"].recorded) == "Position (deg)"

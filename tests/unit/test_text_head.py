@@ -31,6 +31,8 @@ ROWS = "".join(f"{0.01 * k:.3f},{0.1 * k:.3f},{k % 7:.1f}\n" for k in range(1, 6
         ("Time,Position,Torque\n[s],[counts],[%]\n", ["Time [s]", "Position [counts]", "Torque [%]"]),
         ("Time,Position,Torque\ns,rad,Nm/kg\n", ["Time [s]", "Position [rad]", "Torque [Nm/kg]"]),
         ("Time,Position,Torque\ns,1,-\n", ["Time [s]", "Position", "Torque"]),
+        ("Name,Position,Torque\nUnit,rad,V\n", ["Name", "Position [rad]", "Torque [V]"]),
+        ("Time,Position,Name\nUnits:,V,Units:\n", ["Time", "Position [V]", "Name"]),
         ("Time,Pos,Pos\ns,rad,deg\n", ["Time [s]", "Pos [rad]", "Pos [deg]"]),
     ],
 )

@@ -4,7 +4,9 @@ import pytest
 from hypothesis import given, strategies
 
 from rhythmid.errors import InputError
-from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
+from rhythmid.model import Model
+from rhythmid.record.signals import Signals
+from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit, multiple_of_si
 
 
 @pytest.mark.parametrize("spelling", ["N*s/m", "N s/m", "N·s/m", " N * s / m ", "kg/s", "N*s*m^-1"])
@@ -75,3 +77,18 @@ def test_units_per_inertia_are_reduced_and_both_spellings_are_taken():
     assert units.of("N/m") == "1/s^2" and units.of("N*s/m") == "1/s"
     units.check("(rad/s^2)/rad", "N/m", "here")
     units.check("1/s^2", "N/m", "here")
+
+
+@pytest.mark.parametrize("own", ["%", "pct", "V", "px", "duty"])
+def test_a_machines_own_unit_is_taken_by_both_files(own):
+    model = Model.from_text(f'units: {{force: "{own}", position: rad}}\ninertia: {{mass: {{value: 1.0}}}}\n')
+    signals = Signals.from_text(
+        f'time: {{column: t}}\ninput: {{column: u, unit: "{own}"}}\noutput: {{column: y, unit: rad}}\n'
+    )
+    assert model.units.force == signals.channels["input"].unit == own
+    assert Units(own, "rad").of("N*s^2/m*m/s^2") == own
+
+
+@pytest.mark.parametrize("unit", ["mm", "deg", "kN", "rpm"])
+def test_a_multiple_of_an_si_unit_is_named_with_its_scale(unit):
+    assert multiple_of_si(unit) is not None

@@ -8,18 +8,25 @@ import numpy as np
 from rhythmid.identify.output_error import Fit
 from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 
+# share of a prior's standard deviation above which an estimate only repeats it: the records then hold less than a
+# fiftieth of the prior's information
+REPEATS = 0.99
 NAMES = {"input": INPUT_DELAY, "measurement": MEASUREMENT_DELAY}
 
 
 def delays_of(fit: Fit) -> dict[str, Any]:
-    """Delays with standard deviations [s], in the format of the JSON output."""
+    """Delays with standard deviations [s], in the format of the JSON output.
+
+    A standard deviation is None where the records do not determine the delay, so that it is that of its prior.
+    """
     found: dict[str, Any] = {}
     places = {}
     for key, name in NAMES.items():
         if name in fit.model.parameters:
             value = fit.model.value(name)
-            std = fit.std.get(name, 0.0)
-            found[key] = {"value": value, "std": std if math.isfinite(std) else None, "unit": "s"}
+            std, prior = fit.std.get(name, 0.0), fit.model.parameters[name].prior
+            told = std < (math.inf if prior is None else REPEATS * prior.std)
+            found[key] = {"value": value, "std": std if told else None, "unit": "s"}
             if name in fit.names:
                 places[key] = fit.names.index(name)
         else:

@@ -4,10 +4,12 @@ reasons."""
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rhythmid.elements.element import Element, Scales
+from rhythmid.elements.element import OFTEN_ENOUGH, Element, Scales
 from rhythmid.elements.first_guess import NoGuess
 
 IDLE = "no command, forcing or controller drives the machine"
+STEADY = "the drive changes only once in each record, which does not show that its effect changes with time"
+LEVEL = "the drive never changes within a record, which shows no delay, lag or memory on its way"
 
 
 @dataclass(frozen=True)
@@ -89,9 +91,26 @@ def _unsuitable(element: Element, setting: Setting, scales: Scales) -> str | Non
         return "it needs a controller in the model"
     if scales.idle and (element.driven or element.slot in ("command", "actuator", "timing")):
         return IDLE
+    if (reason := _untold_by_levels(element, setting, scales)) is not None:
+        return reason
     if element.displaced_base and not scales.displaced_base:
         return "it needs an input that displaces the base"
     for source, default in element.borrows.values():
         if default is None and source not in setting.parameters:
             return f"it needs {source.split('.')[0]}, which the model does not have"
     return None
+
+
+def _untold_by_levels(element: Element, setting: Setting, scales: Scales) -> str | None:
+    """Reason why a drive that is constant in each record, or only begins with it, does not show an element.
+
+    Its levels show static laws of the actuator. A delay, lag or memory shows where the drive changes, and a change of
+    gain, delay or clock with time where it changes twice. A controller's output changes all the time, but not its
+    reference.
+    """
+    dynamic = element.slot in ("command", "timing") or (
+        element.slot == "actuator" and bool(element.own or element.history or element.delay)
+    )
+    if element.drifts and scales.changes < OFTEN_ENOUGH and (element.delay or not setting.controlled):
+        return STEADY if scales.changes else LEVEL
+    return LEVEL if dynamic and scales.changes == 0 and not setting.controlled else None

@@ -86,6 +86,11 @@ class Parameter:
     turn: float = inf
 
 
+# changes of the drive that show whether what it passes through changes with time: one tells how it is, two that it is
+# no longer the same
+OFTEN_ENOUGH = 2
+
+
 @dataclass(frozen=True)
 class Scales:
     """Scales of a record in the model's units, used for first guesses of parameters."""
@@ -111,6 +116,9 @@ class Scales:
     rest: float | None = None  # position at which the model's linear spring is at rest, where that is known
     displaced_base: bool = False  # whether the input displaces the base that the leg stands on
     idle: bool = False  # whether no command, forcing or controller drives the machine: it moves freely
+    # times at which the recorded drive changes in one record, at most `OFTEN_ENOUGH`: 0 for another level in each
+    # record, 1 for a step with which the records begin
+    changes: int = OFTEN_ENOUGH
     swings: tuple[float, float] = (0.0, 0.0)  # [Hz] lowest and highest frequency of a free oscillation
 
     @property
@@ -202,6 +210,9 @@ class Element:
     controlled: bool = False  # applies only where a controller in the command path closes the loop
     displaced_base: bool = False  # differs from another element only where the input displaces the base
     driven: bool = False  # has no effect without an actuator force, as commands and actuators
+    drifts: bool = (
+        False  # changes with time what the drive passes through: a gain that fades, a clock, a delay
+    )
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
     ranges: Callable[[Scales], Mapping[str, tuple[float, float]]] | None = None
     hops: Callable[[Scales], Mapping[str, float]] | None = None

@@ -17,15 +17,18 @@ EDGE = 1e-3
 
 
 def covariance_of(jacobian: Array, priors: Sequence) -> Array:
-    """Inverse of the Fisher information; infinite variances in directions that the records do not determine."""
+    """Inverse of the Fisher information; infinite variances in directions that the records do not determine.
+
+    A parameter that the records do not determine at all has the variance of its prior.
+    """
     p = jacobian.shape[1]
     if p == 0:
         return np.zeros((0, 0))
-    norms = np.linalg.norm(jacobian, axis=0)
+    precise = np.array([0.0 if one is None else 1.0 / one.std for one in priors])
+    rows = np.vstack([jacobian, np.diag(precise)])
+    norms = np.linalg.norm(rows, axis=0)
     norms[norms == 0.0] = 1e-150
-    scaled = jacobian / norms
-    precise = np.array([0.0 if one is None else 1.0 / (one.std * n) for one, n in zip(priors, norms)])
-    rows = np.vstack([scaled, np.diag(precise)])
+    rows = rows / norms
     information = rows.T @ rows
     eigenvalues, vectors = np.linalg.eigh(information)
     known = eigenvalues > 1e-11 * max(eigenvalues[-1], 1e-300)

@@ -61,7 +61,7 @@ def paper_method(record: Record, model: Model, pumping: Pumping, harmonics: int 
         estimate = estimate_htf(regularised_least_squares(measured, harmonics, ring_down=ring_down))
         fit = fit_magnitude(estimate, model)
         before, ring_down = ring_down, fit.linearised.cycle.ring_down
-        if 0.8 < ring_down / before < 1.25:
+        if 0.8 * before <= ring_down <= 1.25 * before:
             break
         model = fit.model
     delays: dict[int, DelayEstimate] = {}

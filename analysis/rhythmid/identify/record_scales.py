@@ -1,6 +1,7 @@
 """Scales of the records: size and speed of the motion, and the driving signals. They scale first guesses of
 parameters."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from rhythmid.elements.element import Scales
+from rhythmid.elements.element import OFTEN_ENOUGH, Scales
 from rhythmid.identify.series import Series, displacement, dominant_frequency
 from rhythmid.identify.swing_frequency import swing_frequencies
 from rhythmid.model import Model
@@ -70,8 +71,19 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
         displaced_base=any(one.kind == "base_displacement" for one in series),
         idle=not driven,
+        changes=_changes(series, model),
         swings=(0.0, 0.0) if driven else swing_frequencies(series),
     )
+
+
+def _changes(series: Sequence[Series], model: Model) -> int:
+    """Times at which the drive changes in one record, at most `OFTEN_ENOUGH`; the model's own forcing changes often."""
+    if any(term.element.acts == "drive" for term in model.terms):
+        return OFTEN_ENOUGH
+    found = Counter[str]()
+    for one in series:
+        found[one.record or one.name] += one.changes
+    return min(max(found.values(), default=0), OFTEN_ENOUGH)
 
 
 def _place(series: Series, motion: Array) -> Array:

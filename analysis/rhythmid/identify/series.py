@@ -89,13 +89,23 @@ class Series:
     @cached_property
     def commanded(self) -> bool:
         """Whether the command changes during the series, or changed at its start: a constant command is no excitation."""
+        return bool(np.ptp(self._commands) > 0.0)
+
+    @property
+    def _commands(self) -> Array:
+        """Commands at the samples (n,), with the one before where a step begins the record (n + 1,)."""
         told = self._told(self.command)
         if (
             self.command is not None
             and self.time[0] - HISTORY <= self.command.x[0] + self.period < self.time[0]
         ):
-            told = np.append(told, self.command(self.command.x[0]))
-        return bool(np.ptp(told) > 0.0)
+            return np.insert(told, 0, self.command(self.command.x[0]))
+        return told
+
+    @property
+    def changes(self) -> int:
+        """Number of samples at which command or forcing differ from the sample before."""
+        return sum(int(np.count_nonzero(np.diff(one))) for one in (self._commands, self._told(self.forcing)))
 
     @cached_property
     def driven(self) -> bool:

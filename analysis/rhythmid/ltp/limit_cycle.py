@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 SAMPLES = 1000  # samples of the cycle
 RELAXATION = 10  # periods simulated where Newton's method fails
 SETTLING = 8  # periods simulated before Newton's method starts
+DIVERGES = "the model diverges under its forcing; check its parameters"
 TOLERANCE = 1e-11  # tolerance of the fixed point, relative to the motion
 
 
@@ -129,7 +130,7 @@ class PeriodMap:
             self.max_step, out,
         )  # fmt: skip
         if done < len(times) or not np.isfinite(out[-1]).all():
-            raise InputError("the model diverges under its forcing; check its parameters")
+            raise InputError(DIVERGES)
         return out
 
     def __call__(self, start: Array) -> Array:
@@ -142,13 +143,19 @@ class PeriodMap:
         return start
 
     def jacobian(self, start: Array, scale: Array) -> Array:
-        """Central differences of the map with steps of 1e-4 of the motion; force jumps rule out smaller ones."""
+        """Central differences of the map with steps of 1e-4 of the motion; force jumps rule out smaller ones.
+
+        Raises InputError where they overflow: the model diverges.
+        """
         q = len(start)
         jacobian = np.empty((q, q))
-        for i in range(q):
-            step = np.zeros(q)
-            step[i] = 1e-4 * scale[i]
-            jacobian[:, i] = (self(start + step) - self(start - step)) / (2.0 * step[i])
+        with np.errstate(over="ignore", invalid="ignore"):
+            for i in range(q):
+                step = np.zeros(q)
+                step[i] = 1e-4 * scale[i]
+                jacobian[:, i] = (self(start + step) - self(start - step)) / (2.0 * step[i])
+        if not np.isfinite(jacobian).all():
+            raise InputError(DIVERGES)
         return jacobian
 
 

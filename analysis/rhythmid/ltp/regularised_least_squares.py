@@ -11,7 +11,9 @@ factorised once.
 t_c = (⟨|U|²⟩/α)^{1/4} / (2πΔf), ⟨⟩ the mean over bins and Δf their width. So α is set by a time t_c, which has the
 same meaning for records of any length and excitations of any size. It is chosen as 12 ring-down times τ of the
 machine. The peak of a resonance then loses 24 (τ/t_c)⁴ ≈ 0.1 %, and noise later than t_c, where there is no
-response, is suppressed. `smooth` predicts the loss: it is the same operator applied to a model.
+response, is suppressed. `smooth` predicts the loss: it is the same operator applied to a model. A machine may be over
+with its ring-down before the band resolves it, even so fast that the rest after one period is no number any more (τ =
+0). Then t_c is the shortest time that the band resolves.
 """
 
 from collections.abc import Callable
@@ -164,7 +166,9 @@ def regularised_least_squares(
         np.mean(np.abs(spectra.input[(spectra.frequency >= low) & (spectra.frequency <= high)]) ** 2)
     )
     if alpha is None:
-        t_c = window or RING_DOWNS * ring_down
+        t_c = window or max(
+            RING_DOWNS * ring_down, 0.5 / high
+        )  # a band up to `high` resolves no shorter time
         alpha = mean / (2.0 * np.pi * spectra.resolution * t_c) ** 4
     else:
         t_c = (mean / alpha) ** 0.25 / (2.0 * np.pi * spectra.resolution)

@@ -27,7 +27,7 @@ SPELLINGS = {
     "meters": "m", "metre": "m", "metres": "m", "newton": "N", "amp": "A", "amps": "A", "volt": "V", "volts": "V",
     "rads": "rad/s", "mps": "m/s", "radps": "rad/s", "degps": "deg/s", "r/min": "rpm", "1/min": "rpm", "rev/min": "rpm",
     "inch": "in", "inches": "in", "feet": "ft", "foot": "ft", "kips": "kip", "klbf": "kip", "lbs": "lbf", "lb": "lbf", "kmh": "km/h",
-    "percent": "%", "ftlb": "lbf*ft", "ftlbf": "lbf*ft", "lbft": "lbf*ft", "lbfft": "lbf*ft", "inlb": "lbf*in", "inlbf": "lbf*in",
+    "percent": "%", "pct": "%", "ftlb": "lbf*ft", "ftlbf": "lbf*ft", "lbft": "lbf*ft", "lbfft": "lbf*ft", "inlb": "lbf*in", "inlbf": "lbf*in",
     "lbin": "lbf*in", "lbfin": "lbf*in",
     "rpm": "rpm", "deg": "deg", "rad": "rad",  # in any case: RPM, Deg
 }  # fmt: skip

@@ -217,16 +217,19 @@ def _rests(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
 
 
 def _moving(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
-    """Whether a signal (n,) both enters and leaves its plateaus at speed, as a clipped signal does. A machine that
-    comes to rest by friction slows down, and one that hits a stop starts from rest."""
+    """Whether a signal (n,) both enters and leaves its plateaus at speed, as a clipped signal does.
+
+    At speed means that it moves in two steps in a row. A limit knows nothing of the motion, so a signal that it cuts
+    is under way before and goes on after. A machine that comes to rest by friction slows down, one that hits a stop
+    starts from rest, and a jump from one rest to another is over in as long as it takes to see it.
+    """
     step = np.abs(np.diff(value))
     moves = step[step > 0.0]
     if len(moves) == 0:
         return False
     usual = float(np.sqrt(np.mean(moves**2)))
-    entries = [
-        step[begin - 2] for begin, _ in runs if begin >= 2
-    ]  # without the step that the limit itself shortens
-    exits = [step[end] for _, end in runs if end < len(step)]
+    # without the steps into and out of the plateau, which the limit itself shortens
+    entries = [min(step[begin - 3], step[begin - 2]) for begin, _ in runs if begin >= 3]
+    exits = [min(step[end], step[end + 1]) for _, end in runs if end + 1 < len(step)]
     least = max(MOVING * usual, 1.5 * resolution(value))  # a step of a rounded value may be a slow drift
     return all(ends and float(np.median(ends)) > least for ends in (entries, exits))

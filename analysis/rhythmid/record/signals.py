@@ -34,8 +34,8 @@ from pydantic import Field as Limits
 from rhythmid.document import Node, parse, read
 from rhythmid.errors import InputError
 from rhythmid.record.field import Field
-from rhythmid.record.heading import NOT_SI
 from rhythmid.simulation.signal import Hold
+from rhythmid.units import multiple_of_si
 from rhythmid.validation import ByShape, InKeys, Number, Plain, Range, validated
 
 InputKind = Literal["force", "base_displacement", "base_acceleration", "reference"]
@@ -196,8 +196,8 @@ def _column(value: Any) -> Any:
 
 
 def _of_si(unit: str) -> str:
-    if unit in NOT_SI:
-        factor, si = NOT_SI[unit]
+    if (known := multiple_of_si(unit)) is not None:
+        factor, si = known
         raise ValueError(f"{unit} is not an SI unit: write  scale: {factor:.10g}, unit: {si}")
     return unit
 

@@ -6,6 +6,8 @@ from rhythmid.record.heading import bare_unit, is_unit
 
 MOSTLY = 0.5  # share of a line's filled cells with known units above which it is a line of units
 PURE = ("", "-", "1")  # units of dimensionless numbers
+# the label of a line of units, as logged beside them
+LABELS = frozenset("unit units einheit einheiten unite unites unité unités unidad unidades unità".split())
 TYPES = frozenset(
     "double single float float32 float64 real int int8 int16 int32 int64 uint8 uint16 uint32 integer long number numeric bool boolean "
     "string str text char datetime timestamp duration".split()
@@ -51,7 +53,8 @@ def _told_by(names: Sequence[str], above: Sequence[Sequence[str]]) -> list[str]:
 
 def is_units(cells: Sequence[str]) -> bool:
     """Whether a line holds units: most cells do, or all are in brackets, or no cell is anything else, as below
-    names without units."""
+    names without units. Cells that say "Unit" are the line's label."""
+    cells = [cell for cell in cells if not _is_label(cell)] or cells
     filled = [cell for cell in cells if cell.strip()]
     if all(cell.strip()[0] in "[({" and cell.strip()[-1] in "])}" for cell in filled):
         return True
@@ -68,4 +71,8 @@ def is_types(cells: Sequence[str]) -> bool:
 def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
     """Names with their units in brackets, except for dimensionless ones."""
     pairs = zip(names, map(bare_unit, units), strict=True)
-    return [name if unit in PURE else f"{name} [{unit}]" for name, unit in pairs]
+    return [name if unit in PURE or _is_label(unit) else f"{name} [{unit}]" for name, unit in pairs]
+
+
+def _is_label(cell: str) -> bool:
+    return bare_unit(cell).rstrip(":").lower() in LABELS

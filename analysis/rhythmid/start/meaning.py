@@ -104,7 +104,12 @@ NO_EFFORT = COUNTED | frozenset("state states tcp tool flange pose".split())  # 
 WITH_MEANING = frozenset().union(
     COMMANDED, COMMANDED_COLUMNS, CONTROLLED, MEASURED, GENERIC, FORCING, BASE, SHAKEN, DRIVING, DEVICES, *WORDS.values()
 )  # fmt: skip
-IGNORED = frozenset("temp temperature battery power error err status mode".split())
+# what a controller computes from the motion: its error, and the terms of that; no sensor measures them
+COMPUTED = frozenset(
+    "error errors err erreur fehler errore erro ecart abweichung regelabweichung regeldifferenz integral integrale integrator "
+    "term terms pterm iterm dterm".split()
+)
+IGNORED = COMPUTED | frozenset("temp temperature battery power status mode".split())
 
 
 @dataclass(frozen=True)

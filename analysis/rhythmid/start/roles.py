@@ -27,7 +27,7 @@ from rhythmid.start.meaning import (
 )
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along, runs_like_a_clock
 from rhythmid.start.role_choice import Ask, Choice, Known, pick, ranked_by_worth
-from rhythmid.start.step_before import BEFORE, duty_before, set_point_before, step_before
+from rhythmid.start.step_before import BEFORE, duty_before, gone_to_set_point, set_point_before, step_before
 from rhythmid.start.targets import with_targets
 from rhythmid.start.unnamed_joints import column_groups
 from rhythmid.start.unnamed_reference import with_reference
@@ -81,7 +81,7 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
         notes = []
         output = Choice(carried.driven, f"a measured position: {carried.reason}", (carried.driver,))
     else:
-        output, known = _output(known, ask, str(found.path))
+        output, known = _output(known, ask, str(found.path), found.constant, chosen)
         output, known, exchanged = by_direction(output, known)
         notes = [*exchanged]
     choices = {"output": output}
@@ -238,19 +238,31 @@ def _without_empty_letters(known: list[Known]) -> list[Known]:
     return known
 
 
-def _output(known: list[Known], ask: Ask, place: str) -> tuple[Choice, list[Known]]:
-    """The measured motion: a position before a velocity before an acceleration, and the one that moves most."""
+def _output(
+    known: list[Known], ask: Ask, place: str, constant: Sequence[Recorded], joint: Joint
+) -> tuple[Choice, list[Known]]:
+    """The measured motion: a position before a velocity before an acceleration; of several, the one that goes to the
+    set point among the constants, else the one that moves most."""
     for quantity in MEASURED:
         able = [
             one for one in known
             if one.quantity == quantity and one.meaning.commanded is not True and not one.meaning.forcing and not one.meaning.base
         ]  # fmt: skip
         if able:
-            ranked = ranked_by_worth([(_worth_as_output(one), one) for one in able])
+            steered = (
+                gone_to_set_point(constant, joint, [one.one for one in able], quantity)
+                if len(able) > 1
+                else None
+            )
+            ranked = ranked_by_worth(
+                [(np.inf if one.one is steered else _worth_as_output(one), one) for one in able]
+            )
             best = pick("Which is the measured motion (output)?", ranked, ask)
             picked = ranked[best][1]
             reason = next(one.meaning.reason for one in able if one.one is picked)
-            if len(able) > 1:
+            if picked is steered:
+                reason += "; of those it comes nearest to the set point"
+            elif len(able) > 1:
                 reason += "; of those it moves most"
             others = tuple(one for _, one in ranked if one is not picked)
             doubt = doubt_of_letter(picked)

@@ -31,12 +31,29 @@ def set_point_before(
 ) -> Recorded | None:
     """The one set point of the output, among the constants, to which the output moves from another value; None
     where there is none or several."""
-    asked = [
+    asked = [one for one in _asked(constant, joint, measured) if _missed(output, one) < LEFT]
+    return asked[0] if len(asked) == 1 else None
+
+
+def gone_to_set_point(
+    constant: Sequence[Recorded], joint: Joint, outputs: Sequence[Recorded], measured: Quantity
+) -> Recorded | None:
+    """Of several measured motions, the one that comes nearest to the one set point among the constants; None where
+    none goes to it, or there is not one set point."""
+    asked = _asked(constant, joint, measured)
+    if len(asked) != 1:
+        return None
+    nearest = min(outputs, key=lambda one: _missed(one, asked[0]))
+    return nearest if _missed(nearest, asked[0]) < LEFT else None
+
+
+def _asked(constant: Sequence[Recorded], joint: Joint, measured: Quantity) -> list[Recorded]:
+    """The set points of a measured quantity among the constants."""
+    return [
         one for one in constant
         if (meaning := meaning_of(one)).quantity == measured and meaning.commanded and meaning.certain
-        and joint.includes(one, meaning) and np.isfinite(one.value).all() and _goes_to(output, float(one.value[0]))
+        and joint.includes(one, meaning) and np.isfinite(one.value).all()
     ]  # fmt: skip
-    return asked[0] if len(asked) == 1 else None
 
 
 def duty_before(
@@ -63,11 +80,13 @@ def _starts(output: Recorded, measured: Quantity) -> bool:
     return first < SLOW * float(np.sqrt(np.mean(speed**2)))
 
 
-def _goes_to(output: Recorded, wanted: float) -> bool:
-    """Whether an output starts far from this value and is near it in the second half of its samples."""
+def _missed(output: Recorded, asked: Recorded) -> float:
+    """Rms distance of an output from a set point in the second half of its samples, relative to the initial distance;
+    infinite where it starts there."""
+    wanted = float(asked.value[0])
     value = output.value[np.isfinite(output.value)]
-    after = value[len(value) // 2 :] - wanted
-    return bool(float(np.sqrt(np.mean(after**2))) < LEFT * abs(float(value[0]) - wanted))
+    after, first = value[len(value) // 2 :] - wanted, abs(float(value[0]) - wanted)
+    return float(np.sqrt(np.mean(after**2))) / first if first > 0.0 else np.inf
 
 
 def _is_known(one: Recorded) -> bool:

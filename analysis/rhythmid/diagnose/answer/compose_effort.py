@@ -15,6 +15,7 @@ from rhythmid.diagnose.answer.result import (
     settled,
 )
 from rhythmid.diagnose.answer.untold import without_untold
+from rhythmid.diagnose.answer.varied_motion import motion_varying
 from rhythmid.diagnose.answer.wording import NOT_LOCATED, freed_value, listed, recalibrated, summary_of
 from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.effort.fitted import Fitted
@@ -122,6 +123,6 @@ def _next_experiment(result: EffortResult) -> str:
     left = decision.unexplained
     if left.further:
         return f"a longer record of more varied motion: what would establish {listed(left.further)}, or rule it out"
-    if left.significant:
-        return f"the same motion with {left.goes_with} varied alone over its whole range"
+    if left.significant and left.goes_with is not None:
+        return motion_varying(left.goes_with)
     return "motion with more varied speed, load and position"

@@ -10,6 +10,7 @@ from rhythmid.identify.inverse_dynamics.balance import Balance
 
 Array = NDArray[np.float64]
 BINS = 16  # bins with equal numbers of rows: enough for a curve, each with enough rows for a mean
+SPEED_OF = "the velocity of "  # before the name of another joint
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,7 @@ def remainder_of(balance: Balance, fitted: Fitted) -> tuple[Curve, ...]:
         speed = np.concatenate(
             [m.others[joint][p] for m, p in zip(balance.motions, balance.places, strict=True)]
         )
-        curves.append(replace(_curve(f"the velocity of {joint}", speed, left), joint=joint))
+        curves.append(replace(_curve(SPEED_OF + joint, speed, left), joint=joint))
     return tuple(sorted(curves, key=lambda one: -one.share))
 
 

@@ -20,6 +20,7 @@ ELEMENT = Element(
     size="rate",
     starts=lambda s: [{"rate": 0.01 / s.duration}],
     also_known_as=("battery sag", "thermal derating"),
+    drifts=True,
     family="drift",
     confusable={
         "stiffness_drift": "changes the gain, not the resonance: repeat the first experiment at the end",

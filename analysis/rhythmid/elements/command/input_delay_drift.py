@@ -20,6 +20,7 @@ ELEMENT = Element(
     size="rate",
     starts=lambda s: [{"rate": 0.02 / (s.natural_frequency * s.duration)}],
     also_known_as=("queue build-up", "latency drift"),
+    drifts=True,
     family="clock",
     confusable={
         "clock_skew": "leaves the limit cycle's phase alone",

@@ -21,6 +21,7 @@ ELEMENT = Element(
     size="skew",
     starts=lambda s: [{"skew": 0.02 / (s.natural_frequency * s.duration)}],
     also_known_as=("sample-rate error", "clock drift"),
+    drifts=True,
     family="clock",
     same_as=("delay_drift",),
     confusable={

@@ -21,6 +21,7 @@ ELEMENT = Element(
     size="rate",
     starts=lambda s: [{"rate": 0.02 / (s.natural_frequency * s.duration)}],
     also_known_as=("latency drift",),
+    drifts=True,
     family="clock",
     same_as=("clock_skew",),
     confusable={
