@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhythmid.identify.series import bandwidth, dominant_frequency, moving_part, prepare
+from rhythmid.identify.motion_band import bandwidth, moving_part
+from rhythmid.identify.series import dominant_frequency, prepare
 from rhythmid.record.record import Channel, Record
 
 RATE, FREQUENCY = 50.0, 2.7

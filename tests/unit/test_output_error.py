@@ -9,10 +9,11 @@ from scipy.interpolate import CubicSpline
 import rhythmid as rh
 from machines import CATALOGUE, SHORT, hopper, record, records
 from rhythmid.errors import InputError
+from rhythmid.identify.motion_band import block_length
 from rhythmid.identify.multiple_shooting import split, windows
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate, start_only
-from rhythmid.identify.series import block_length, hold_out_tail, prepare
+from rhythmid.identify.series import hold_out_tail, prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 from rhythmid.value import Prior

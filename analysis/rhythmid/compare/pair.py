@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rhythmid.compare.align import Alignment, active, smooth, white_level
 from rhythmid.compare.oscillator import Oscillator, oscillator_of, ringing
 from rhythmid.errors import InputError
-from rhythmid.identify.series import bandwidth, block_length
+from rhythmid.identify.motion_band import bandwidth, block_length
 from rhythmid.ltp.pumping import active_pumping
 from rhythmid.record.record import Record
 

@@ -13,7 +13,6 @@ from rhythmid.identify.declared import own_model
 from rhythmid.identify.inputs import Pieces
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
-from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.compiled import Compiled, compile_model
 from rhythmid.simulation.generated_source import InputKind, OutputKind, Variant
 from rhythmid.simulation.signal import is_held, pieces
@@ -59,9 +58,8 @@ class FreeRun:
     @property
     def longest_step(self) -> float:
         """Largest integration step [s]; every step also ends at a block or at a knot of the command."""
-        return min(
-            [*(one.period * one.block for one in self.series), *([] if self.smooth else _ticks(self.series))]
-        )
+        ticks = [] if self.smooth else [one.inputs.tick for one in self.series]
+        return min([*(one.period * one.block for one in self.series), *ticks])
 
     def rows(self, model: Model, index: int, start: Array, disturbance: PPoly | None = None) -> Array | None:
         """Rows (blocks, states + 2) of the compiled loop at the block centres of series `index`.
@@ -119,12 +117,6 @@ def _sees_steps(model: Model) -> bool:
     return any(term.element.memories for term in model.terms if term.element.slot in ("command", "actuator"))
 
 
-def _ticks(series: Sequence[Series]) -> list[float]:
-    """Usual time [s] between the knots of each series' command."""
-    knots = [one.command.x[:-1] for one in series if one.command is not None]
-    return [nominal_period(np.diff(times)) for times in knots if len(times) > 2]
-
-
 def prepare_run(
     model: Model, series: Sequence[Series], max_step: float | None = None, disturbed: bool = False
 ) -> FreeRun:
@@ -166,7 +158,7 @@ def _longest_step(model: Model, series: Sequence[Series], smooth: bool) -> float
     """
     controlled = any(term.element.acts == "feedback" for term in model.terms)
     blocks = [one.period * (1 if controlled else one.block) for one in series]
-    return min([*blocks, *([] if smooth else _ticks(series))])
+    return min([*blocks, *([] if smooth else [one.inputs.tick for one in series])])
 
 
 def start_of(model: Model, run: FreeRun, index: int, position: float, velocity: float) -> Array:

@@ -51,14 +51,18 @@ class Inputs:
         return pieces(self.forced)
 
     @cached_property
+    def tick(self) -> float:
+        """Usual time [s] between the knots of the command; infinite without two of them."""
+        knots = np.empty(0) if self.commanded is None else self.commanded.x[:-1]
+        return nominal_period(np.diff(knots)) if len(knots) > 2 else np.inf
+
+    @cached_property
     def even_tick(self) -> float:
         """Usual time [s] between the knots of a held command; infinite without one, or where its times are uneven."""
         command = self.commanded
         if command is None or not is_held(command) or len(command.x) <= SMOOTHED_FROM:
             return np.inf
-        step = np.diff(command.x[:-1])
-        usual = nominal_period(step)
-        return np.inf if float(np.median(step)) < BURSTS * usual else usual
+        return np.inf if float(np.median(np.diff(command.x[:-1]))) < BURSTS * self.tick else self.tick
 
     @cached_property
     def smooth(self) -> Pieces:

@@ -3,7 +3,6 @@
 Block averages are compared: far above the machine's dynamics samples contain no information. The simulation is averaged in the same way.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,6 +15,7 @@ from scipy.interpolate import PPoly
 from rhythmid.errors import InputError
 from rhythmid.identify.initial_step import HISTORY, stepped, value_before
 from rhythmid.identify.inputs import Inputs, Pieces
+from rhythmid.identify.motion_band import block_length, moving_part
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.spread import relative_spreads
 from rhythmid.motion_power import motion_power
@@ -25,9 +25,6 @@ from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.generated_source import InputKind, OutputKind
 from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, is_held, is_smooth, spline
 
-# share of a motion's power after a Hann window (3/8 for a steady motion) below which the motion has died out
-ERASED = 0.02
-LEAST_PART = 16  # least number of samples for a spectrum
 # share of blocks with a gap above which timestamps are too uneven for averaging; rare gaps cost fewer
 TORN = 0.1
 OFTEN = 0.5  # in blocks: interval of a held command below which the machine averages its steps
@@ -234,42 +231,6 @@ def _extended(samples: Array, count: int) -> Array:
         )
         samples = np.concatenate([[first], samples, [last]])
     return samples
-
-
-def moving_part(value: Array) -> Array:
-    """The samples (n,) without a final part in which hardly anything moves.
-
-    A Hann window over a motion that dies out at once would leave almost none of it. The samples are halved until
-    the window leaves some of the motion's power.
-    """
-    while len(value) >= 2 * LEAST_PART:
-        motion = value - value[len(value) // 2 :].mean()
-        power = np.sum(motion**2)
-        if power == 0.0 or np.sum((motion * np.hanning(len(motion))) ** 2) > ERASED * power:
-            break
-        value = value[: len(value) // 2]
-    return value
-
-
-def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
-    """Frequency [Hz] below which `share` of the motion's power lies, without mean and trend."""
-    value = moving_part(value)
-    n = len(value)
-    detrended = value - np.linspace(value[: max(1, n // 50)].mean(), value[-max(1, n // 50) :].mean(), n)
-    length = fast_length(n)
-    power = np.abs(np.fft.rfft(detrended * np.hanning(n), length)) ** 2
-    floor = np.median(power[len(power) // 2 :])  # measurement noise, from the upper half of the band
-    # the power of noise at a frequency is distributed exponentially: the largest of n values is about log2(n) times their median
-    power = np.maximum(power - math.log2(len(power)) * floor, 0.0)
-    total = np.cumsum(power)
-    if total[-1] <= 0.0:
-        return 0.5 / period
-    return float(max(np.searchsorted(total, share * total[-1]), 1) / (length * period))
-
-
-def block_length(value: Array, period: float) -> int:
-    """Number of samples to average: at least sixteen averages remain in the shortest period with power."""
-    return int(np.clip(np.floor(1.0 / (16.0 * bandwidth(value, period) * period)), 1, 10))
 
 
 def _spline_of(time: Array, value: Array) -> PPoly:

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.identify.series import Series, moving_part
+from rhythmid.identify.motion_band import moving_part
+from rhythmid.identify.series import Series
 
 Array = NDArray[np.float64]
 # share of the largest amplitude below which cycles are ignored: noise causes random zero crossings

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.motion_band import block_length
 from rhythmid.identify.noise import NoiseModel, estimate_noise
-from rhythmid.identify.series import block_length
 from rhythmid.model import Model
 from rhythmid.record.timing import nominal_period
 from rhythmid.twin.changes import Change, watched

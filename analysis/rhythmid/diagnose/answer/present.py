@@ -28,9 +28,10 @@ from rhythmid.diagnose.search.forward import LEVEL, Search
 from rhythmid.elements.element import Element
 from rhythmid.errors import InputError
 from rhythmid.identify.joint_covariance import JointCovariance
+from rhythmid.identify.motion_band import bandwidth
 from rhythmid.identify.output_error import Fit, noise_of
 from rhythmid.identify.repeats import noise_from_repeats
-from rhythmid.identify.series import Series, bandwidth
+from rhythmid.identify.series import Series
 from rhythmid.identify.shown_runs import free_runs
 from rhythmid.ltp.htf import theoretical_htf
 from rhythmid.ltp.pumping import Pumping, active_pumping
