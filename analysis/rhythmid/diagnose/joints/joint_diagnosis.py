@@ -15,7 +15,7 @@ from rhythmid.body.inertial_parameter import MASS, PAYLOAD, TURNING, split
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
-from rhythmid.diagnose.case import Budget
+from rhythmid.diagnose.case import EXPLAINED, SEARCHED, WEIGHED, Budget
 from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.joints.equivalents import equivalent_names, equivalents
@@ -169,9 +169,9 @@ def _explained(
     links: dict[str, WrongLink] = {}
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
     delay = reference_delay(balances, balances.computed) if balances.computed else None
-    found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget, delay)
+    found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget, delay, SEARCHED)
     most = max(MOST_LINKS, len(machine.body.links))
-    while len(links) < most and len(balances.refuted) < most and not budget.spent:
+    while len(links) < most and len(balances.refuted) < most and not budget.passed(WEIGHED):
         best = _heaviest(found, set(links))
         if best is None:
             break
@@ -184,7 +184,7 @@ def _explained(
         unseen = JointBalances.of(tried, holdout, changed) if holdout else None
         late = reference_delay(changed, changed.computed) if changed.computed else None
         better, refused_now = _searched(changed, unseen, again, catalogue, tell, budget, late)
-        if weight_of_joints(found, better, again) < -decisive(1) and not budget.spent:
+        if weight_of_joints(found, better, again) < -decisive(1):
             tell(f"{link} of {result.joint} is refuted by the joints that it moves")
             balances = JointBalances.of(machine, records, balances.without(result.joint, link))
             unseen = JointBalances.of(machine, holdout, balances) if holdout else None
@@ -198,15 +198,18 @@ def _explained(
 
 def _searched(
     balances: JointBalances, unseen: JointBalances | None, joints: Sequence[str], catalogue: Catalogue,
-    tell: Tell, budget: Budget, delay: ReferenceDelay | None,
+    tell: Tell, budget: Budget, delay: ReferenceDelay | None, end: float = EXPLAINED,
 ) -> tuple[dict[str, JointResult], dict[str, str]]:  # fmt: skip
+    """The results of joints, and the reasons for those that cannot be judged. The joints share the time until this share of the budget has
+    passed: each has the same part of what those before it have left, in which it is also weighed."""
     found: dict[str, JointResult] = {}
     refused: dict[str, str] = {}
     late = 0.0 if delay is None else delay.shared.value
-    for joint in joints:
+    for place, joint in enumerate(joints):
         tell(f"joint {joint}")
+        own = budget.part(end, len(joints) - place)
         try:
-            found[joint] = diagnose_joint(balances, unseen, joint, catalogue, tell, budget, late)
+            found[joint] = diagnose_joint(balances, unseen, joint, catalogue, tell, own, late)
         except InputError as error:
             refused[joint] = str(error)
     return found, refused
