@@ -21,7 +21,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, header_clock, inventory
 from rhythmid.record.joint_record import JointSignals, load_joint_records
 from rhythmid.start.drivers import not_read
-from rhythmid.start.families import GENERIC, Family, families_of, joints_of
+from rhythmid.start.families import GENERIC, Family, families_of, joints_of, with_constants
 from rhythmid.start.meaning import Quantity, meaning_of, says_it_was_read, words_of
 from rhythmid.start.yaml_text import GUESSED, as_guessed, comment, time_of
 
@@ -76,6 +76,7 @@ def start_robot(
             f"its joints: {', '.join(robot.joints)}"
         )
     joints = joints_of(list(robot.joints), list(output.members), output.told)
+    families = [one if one is output else with_constants(one, found, output.members) for one in families]
     effort, others = _effort(families, output)
     reference = _beside(families, "position", True, output)
     command = _beside(families, "effort", True, output)
@@ -179,6 +180,8 @@ def _doubts_of_effort(effort: Family | None, others: Sequence[Family], command: 
             "effort: no other one was recorded than what the actuators were asked for, which they may not have made"
         ]
     doubts: list[str] = []
+    if still := [name for name, one in effort.members.items() if not np.any(one.value)]:
+        doubts.append(f"effort: that of {', '.join(still)} is always 0, as where no motor acts")
     if not effort.first.unit and CURRENTS & set(words_of(effort.pattern.lower())):
         doubts.append(
             f"effort: {effort.pattern} is called a current; where it is in A, give it the torque or force of one ampere at each joint, such as  "

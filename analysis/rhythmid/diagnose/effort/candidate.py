@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 SEEN = ("force", "actuator")  # slots whose elements show in the effort balance
 # the same where a controller computes the effort from its reference
 SEEN_BY_REFERENCE = (*SEEN, "command")
+NO_MOTOR = "it acts on the force of an actuator, and the effort that was recorded is zero: no motor acts"
 LARGEST = 30.0  # largest start of an effect, times its first guess
 LEAST_START = (
     0.05  # smallest start, share of its first guess: at zero the effect's shape parameters have no derivative
@@ -55,13 +56,15 @@ def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
     for element, values in candidates(catalogue.within(sizes), model.setting, sizes).tried:
         if not _seen(element, balance):
             continue
-        if driven and (element.slot == "actuator" or element.acts == "drive"):
+        if (driven or balance.undriven) and element.slot == "actuator":
+            continue
+        if driven and element.acts == "drive":
             continue
         found.append(Start("effects", element.name, element, values))
     found += [
         Start("freed_value", name, None, {name: model.value(name)}) for name in fixed_values(balance, model)
     ]
-    if not driven:
+    if not (driven or balance.undriven):
         found.append(Start("delay", INPUT_DELAY, None, {}))
     return found
 
@@ -86,7 +89,11 @@ def not_tried(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
     """
     reasons = dict(candidates(catalogue.within(sizes), model.setting, sizes).not_tried)
     for element in catalogue.values():
-        if not element.candidate or _seen(element, balance):
+        if not element.candidate:
+            continue
+        if _seen(element, balance):
+            if balance.undriven and element.slot == "actuator":
+                reasons[element.name] = NO_MOTOR
             continue
         if element.slot not in SEEN:
             reasons[element.name] = f"it acts in the {element.slot} path, which the effort does not show"
