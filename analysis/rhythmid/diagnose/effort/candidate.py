@@ -108,14 +108,16 @@ def fixed_values(balance: Balance, model: Model) -> list[str]:
     """Fixed values of the model that the effort can determine.
 
     Left out are choices of form (an exponent, a side) and zeros of elements, which the file may not have meant. A link's
-    zero payload is kept, because it is meant.
+    zero payload is kept, because it is meant. Where no motor acts, the forces of the body balance one another, and no effort tells their
+    size: there masses that are freed one after another make all of them vanish, and links are left to the joints that are driven.
     """
     links = balance.motions[0].links
     freed = {
         n
         for n, value in model.parameters.items()
         if value.fixed and (value.value != 0.0 or n in links) and n != INERTIA
-    }
+        and not (balance.undriven and n in links)
+    }  # fmt: skip
     forms = {f"{t.label}.{p.name}" for t in model.terms for p in t.element.parameters if p.fixed}
     open_model = with_freed(model, freed - forms)
     names = [name for name in balance.estimated(open_model) if name in freed - forms]

@@ -40,6 +40,7 @@ from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.same_recording import check_held_out
+from rhythmid.record.unsigned import unsigned_joints
 from rhythmid.result import Result, Row
 from rhythmid.simulation.transport import INPUT_DELAY
 
@@ -110,9 +111,10 @@ def diagnose_machine(
     holdout, of_holdout = cleaned_joints(holdout)
     check_joints(machine, records)
     balances = balances_of(machine, records)
+    unsigned = unsigned_joints(records)
     best = None
     for reading in likely_readings(balances, records):
-        tried = _explained(machine, reading, records, holdout, known, tell, spent)
+        tried = _explained(machine, reading, records, holdout, known, tell, spent, unsigned)
         best = tried if best is None or tried.causes < best.causes else best
         if best.causes <= 1 or spent.spent:
             break
@@ -163,13 +165,15 @@ class _Explained:
 
 def _explained(
     machine: Machine, balances: JointBalances, records: Sequence[JointRecord], holdout: Sequence[JointRecord],
-    catalogue: Catalogue, tell: Tell, budget: Budget,
+    catalogue: Catalogue, tell: Tell, budget: Budget, unsigned: Mapping[str, str],
 ) -> _Explained:  # fmt: skip
-    """Search every joint, correct a link's mass or inertia where one is found, and search the joints that feel it again."""
+    """Search every joint whose effort has its sign, correct a link's mass or inertia where one is found, and search the joints that feel it again."""
     links: dict[str, WrongLink] = {}
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
     delay = reference_delay(balances, balances.computed) if balances.computed else None
-    found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget, delay, SEARCHED)
+    joints = [joint for joint in machine.joints if joint not in unsigned]
+    found, refused = _searched(balances, unseen, joints, catalogue, tell, budget, delay, SEARCHED)
+    refused |= unsigned
     most = max(MOST_LINKS, len(machine.body.links))
     while len(links) < most and len(balances.refuted) < most and not budget.passed(WEIGHED):
         best = _heaviest(found, set(links))
@@ -180,7 +184,7 @@ def _explained(
         tried = wrong.put_right(machine)
         changed = JointBalances.of(tried, records, balances)
         owner, _ = split(link)
-        again = [joint for joint in machine.joints if feels(changed, joint, owner)]
+        again = [joint for joint in joints if feels(changed, joint, owner)]
         unseen = JointBalances.of(tried, holdout, changed) if holdout else None
         late = reference_delay(changed, changed.computed) if changed.computed else None
         better, refused_now = _searched(changed, unseen, again, catalogue, tell, budget, late)

@@ -39,6 +39,7 @@ from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.same_recording import check_held_out
+from rhythmid.record.unsigned import unsigned_joints
 from rhythmid.report.quantity import in_words
 from rhythmid.result import Result, Row
 from rhythmid.statistics import NORMAL_95
@@ -209,6 +210,7 @@ def identify_machine(
         correlations.append(Correlations.of_fit(joint, fit))
     tell("free runs")
     runs, notes = {}, [*machine.body.notes, *said, *of_holdout]
+    notes.extend(f"{joint}: {why}" for joint, why in unsigned_joints(records).items())
     if common is not None:
         notes.append(common.told)
     if better is not None:
