@@ -118,5 +118,5 @@ def test_check_and_diagnose_of_a_robot_say_in_the_same_words_that_efforts_have_n
     records = load_joint_records([arm], JointSignals.load(signals))
     assert unsigned_joints(records) == {"one": said, "two": said}
     assert [note for note in quality_report(arm, signals).notes if said in note]
-    with pytest.raises(InputError, match=f"no joint can be judged: {said}"):
+    with pytest.raises(InputError, match=f"no joint can be judged: one, two: {said}"):
         diagnose_machine(records, Machine.load(model))

@@ -41,6 +41,10 @@ class Budget:
         now = time.monotonic()
         return Budget(max(self.at(share) - now, 0.0) / parts, now)
 
+    def allows(self, seconds: float, share: float) -> bool:
+        """Whether what takes so long would end before this share of the budget has passed."""
+        return time.monotonic() + seconds <= self.at(share)
+
     @property
     def spent(self) -> bool:
         """Whether the search must not begin anything new."""

@@ -6,6 +6,7 @@ carries it. If one is found, it is corrected, and the joints that feel it are se
 """
 
 import math
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,7 @@ from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.link_centre import feels
-from rhythmid.diagnose.joints.link_evidence import weight_of_joints
+from rhythmid.diagnose.joints.link_evidence import weight_of_joints, weight_of_values
 from rhythmid.diagnose.joints.misfit import misfits
 from rhythmid.diagnose.joints.stated_fit import stated_fit
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
@@ -52,6 +53,8 @@ MOST_LINKS = 2
 # share of the given mass of a link, below which another effect has absorbed it. An inertia in a file may be that about the joint,
 # of which the inertia about the centre of mass may be any share
 LIGHTEST = 0.1
+# time of the correction of a link's value, in times that the balances of all joints take (measured: 20 for an arm of seven joints)
+CORRECTION = 20.0
 MATTERS = 0.02  # smallest change of a mass or an inertia that an effort balance resolves, as a share of it
 
 
@@ -110,17 +113,23 @@ def diagnose_machine(
     records, said = cleaned_joints(records)
     holdout, of_holdout = cleaned_joints(holdout)
     check_joints(machine, records)
+    began = time.monotonic()
     balances = balances_of(machine, records)
+    correction = CORRECTION * (time.monotonic() - began)
     unsigned = unsigned_joints(records)
     best = None
     for reading in likely_readings(balances, records):
-        tried = _explained(machine, reading, records, holdout, known, tell, spent, unsigned)
+        tried = _explained(machine, reading, records, holdout, known, tell, spent, unsigned, correction)
         best = tried if best is None or tried.causes < best.causes else best
         if best.causes <= 1 or spent.spent:
             break
     assert best is not None  # there is at least one reading
     if not best.found:
-        raise InputError(f"no joint can be judged: {next(iter(best.refused.values()))}")
+        reasons = dict.fromkeys(best.refused.values())
+        why = [
+            f"{', '.join(j for j, one in best.refused.items() if one == each)}: {each}" for each in reasons
+        ]
+        raise InputError(f"no joint can be judged: {'; '.join(why)}")
     answers = {joint: _answer(one) for joint, one in best.found.items()}
     told = () if records[0].sampled else tuple(told_of(best.leads))
     put_right = (one.beside(machine) for one in best.links.values())
@@ -165,53 +174,71 @@ class _Explained:
 
 def _explained(
     machine: Machine, balances: JointBalances, records: Sequence[JointRecord], holdout: Sequence[JointRecord],
-    catalogue: Catalogue, tell: Tell, budget: Budget, unsigned: Mapping[str, str],
+    catalogue: Catalogue, tell: Tell, budget: Budget, unsigned: Mapping[str, str], correction: float,
 ) -> _Explained:  # fmt: skip
-    """Search every joint whose effort has its sign, correct a link's mass or inertia where one is found, and search the joints that feel it again."""
+    """Search every joint whose effort has its sign, correct a link's mass or inertia where one is found, and search the joints that feel it again.
+
+    A correction takes about so many seconds. Of the joints that feel it those come first whose efforts, with the effects that are known there,
+    contradict it: only a further effect could reconcile them. If they do not find one, it is refuted, and the other joints keep their results.
+    """
     links: dict[str, WrongLink] = {}
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
     delay = reference_delay(balances, balances.computed) if balances.computed else None
     joints = [joint for joint in machine.joints if joint not in unsigned]
     found, refused = _searched(balances, unseen, joints, catalogue, tell, budget, delay, SEARCHED)
-    refused |= unsigned
+    refused = {**unsigned, **refused}
     most = max(MOST_LINKS, len(machine.body.links))
-    while len(links) < most and len(balances.refuted) < most and not budget.passed(WEIGHED):
+    while len(links) < most and len(balances.refuted) < most and budget.allows(correction, WEIGHED):
         best = _heaviest(found, set(links))
         if best is None:
             break
         link, result = best
         wrong = wrong_link(balances, records, found, link, result)
+        if budget.passed(WEIGHED):
+            break
         tried = wrong.put_right(machine)
-        changed = JointBalances.of(tried, records, balances)
-        owner, _ = split(link)
-        again = [joint for joint in joints if feels(changed, joint, owner)]
-        unseen = JointBalances.of(tried, holdout, changed) if holdout else None
-        late = reference_delay(changed, changed.computed) if changed.computed else None
-        better, refused_now = _searched(changed, unseen, again, catalogue, tell, budget, late)
-        if weight_of_joints(found, better, again) < -decisive(1):
+        better: dict[str, JointResult] = {}
+        refused_now: dict[str, str] = {}
+        refuted = removes(machine, wrong)
+        if not refuted:
+            changed = JointBalances.of(tried, records, balances)
+            again = [joint for joint in joints if feels(changed, joint, split(link)[0])]
+            seen = JointBalances.of(tried, holdout, changed) if holdout else None
+            late = reference_delay(changed, changed.computed) if changed.computed else None
+            weight = {one: weight_of_values(found, balances, changed, [one]) for one in again if one in found}
+            first = [joint for joint in weight if weight[joint] < 0.0]
+            rest = [joint for joint in again if joint not in first]
+            better, refused_now = _searched(
+                changed, seen, first, catalogue, tell, budget, late, waiting=len(rest)
+            )
+            others = sum(one for one in weight.values() if one >= 0.0)
+            refuted = others + weight_of_joints(found, better, first) < -decisive(1)
+        if refuted:
             tell(f"{link} of {result.joint} is refuted by the joints that it moves")
             balances = JointBalances.of(machine, records, balances.without(result.joint, link))
             unseen = JointBalances.of(machine, holdout, balances) if holdout else None
             better, refused_now = _searched(balances, unseen, [result.joint], catalogue, tell, budget, delay)
         else:
+            more, refused_too = _searched(changed, seen, rest, catalogue, tell, budget, late)
+            better, refused_now = {**better, **more}, {**refused_now, **refused_too}
             links[wrong.parameter] = wrong
-            machine, balances, delay = tried, changed, late
+            machine, balances, delay, unseen = tried, changed, late, seen
         found, refused = {**found, **better}, {**refused, **refused_now}
     return _Explained(machine, found, refused, links, balances.leads, delay)
 
 
 def _searched(
     balances: JointBalances, unseen: JointBalances | None, joints: Sequence[str], catalogue: Catalogue,
-    tell: Tell, budget: Budget, delay: ReferenceDelay | None, end: float = EXPLAINED,
+    tell: Tell, budget: Budget, delay: ReferenceDelay | None, end: float = EXPLAINED, waiting: int = 0,
 ) -> tuple[dict[str, JointResult], dict[str, str]]:  # fmt: skip
-    """The results of joints, and the reasons for those that cannot be judged. The joints share the time until this share of the budget has
-    passed: each has the same part of what those before it have left, in which it is also weighed."""
+    """The results of joints, and the reasons for those that cannot be judged. They share the time until this share of the budget has passed
+    with so many joints that are `waiting`: each has the same part of what those before it have left, in which it is also weighed."""
     found: dict[str, JointResult] = {}
     refused: dict[str, str] = {}
     late = 0.0 if delay is None else delay.shared.value
     for place, joint in enumerate(joints):
         tell(f"joint {joint}")
-        own = budget.part(end, len(joints) - place)
+        own = budget.part(end, len(joints) + waiting - place)
         try:
             found[joint] = diagnose_joint(balances, unseen, joint, catalogue, tell, own, late)
         except InputError as error:
@@ -270,11 +297,24 @@ def _differs(one: JointResult, label: str) -> bool:
         return True
     before, after = one.case.nominal.value(label), one.result.chosen.model.value(label)
     owner, kind = split(label)
-    if after <= 0.0 if kind == TURNING else after < LIGHTEST * before:
+    if _removed(kind, before, after):
         return False  # an effect that removes a link's mass or its whole inertia is another one
     known = one.case.nominal.parameters
     whole = known[f"{owner}.{MASS}"].value if kind == PAYLOAD and f"{owner}.{MASS}" in known else before
     return abs(after - before) > MATTERS * abs(whole)
+
+
+def _removed(kind: str, before: float, after: float) -> bool:
+    """Whether a value of a link has gone from what it is in the model."""
+    return after <= 0.0 if kind == TURNING else after < LIGHTEST * before
+
+
+def removes(machine: Machine, wrong: WrongLink) -> bool:
+    """Whether a corrected value would remove a link's mass or its whole inertia: what all joints together say may, where one joint did not."""
+    _, kind = split(wrong.parameter)
+    return kind in wrong.values and _removed(
+        kind, machine.body.parameters[wrong.parameter], wrong.values[kind].value
+    )
 
 
 def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, JointResult] | None:
