@@ -25,7 +25,7 @@ from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, nam
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.link_centre import feels
 from rhythmid.diagnose.joints.link_evidence import weight_of_joints, weight_of_values
-from rhythmid.diagnose.joints.misfit import misfits
+from rhythmid.diagnose.joints.misfit import braking, misfits
 from rhythmid.diagnose.joints.stated_fit import stated_fit
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
 from rhythmid.diagnose.rejections import decisive
@@ -134,7 +134,15 @@ def diagnose_machine(
     told = () if records[0].sampled else tuple(told_of(best.leads))
     put_right = (one.beside(machine) for one in best.links.values())
     late = () if best.delay is None else (best.delay.told,)
-    notes = (*machine.body.notes, *said, *of_holdout, *told, *late, *put_right, *misfits(answers))
+    notes = (
+        *machine.body.notes,
+        *said,
+        *of_holdout,
+        *told,
+        *late,
+        *put_right,
+        *misfits(answers, braking(best.found, machine)),
+    )
     diagnosis = compose_machine(
         machine, best.found, answers, best.stated, best.links, best.refused, notes, best.delay
     )
