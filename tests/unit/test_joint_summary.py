@@ -7,10 +7,11 @@ from typing import Any
 import pytest
 from answers import diagnosed
 
+from rhythmid.diagnose.answer.compose_effort import FIXED_SCALE
 from rhythmid.diagnose.answer.result import FitQuality
 from rhythmid.diagnose.joints.equivalents import probability_together
 from rhythmid.diagnose.joints.joint_answer import JointEffect
-from rhythmid.diagnose.joints.joint_compose import summary_of_joints
+from rhythmid.diagnose.joints.joint_compose import COMPUTED, assumptions_of, summary_of_joints
 
 
 def test_each_joint_is_told_with_its_own_rivals():
@@ -95,3 +96,18 @@ def test_the_names_of_a_group_have_its_evidence_times_the_chance_that_they_are_l
     )
     joint: Any = SimpleNamespace(joint="knee", result=result, rotors=())
     assert probability_together(joint, "stribeck_friction") == pytest.approx(0.8 * (0.5 + 0.3))
+
+
+def test_an_effort_that_was_computed_is_not_said_to_be_recorded():
+    answers = {
+        joint: replace(diagnosed("consistent"), assumptions=(FIXED_SCALE,)) for joint in ("hip", "knee")
+    }
+    machine: Any = SimpleNamespace(body=SimpleNamespace(contacts=False))
+
+    def said(*computed: str) -> tuple[str, ...]:
+        found: Any = {joint: SimpleNamespace(by_reference=joint in computed) for joint in answers}
+        return assumptions_of(machine, found, answers)
+
+    assert said() == (FIXED_SCALE,)
+    assert said("knee") == (FIXED_SCALE, COMPUTED.format("knee"))
+    assert said("hip", "knee") == (COMPUTED.format("hip, knee"),)

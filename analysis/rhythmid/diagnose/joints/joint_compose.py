@@ -103,7 +103,7 @@ def compose_machine(
         joints=dict(answers),
         not_judged=dict(refused),
         families={joint: one.families for joint, one in answers.items() if one.families},
-        assumptions=_assumptions(machine, found, answers),
+        assumptions=assumptions_of(machine, found, answers),
         notes=tuple(notes),
         reference_delay=delay,
     )
@@ -279,9 +279,10 @@ def _next(
     return next(iter(answers.values())).next_experiment
 
 
-def _assumptions(
+def assumptions_of(
     machine: Machine, found: Mapping[str, JointResult], answers: Mapping[str, Diagnosis]
 ) -> tuple[str, ...]:
+    """What is assumed; of the scale of a recorded effort only where one was recorded."""
     late = [joint for joint, one in found.items() if one.by_reference]
     said = list(next(iter(answers.values())).assumptions)
     if len(late) == len(found):
