@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rhythmid.body.body import BODY
@@ -19,16 +20,15 @@ from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.case import EXPLAINED, SEARCHED, WEIGHED, Budget
 from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.joints.contradiction import Searched, contradicted
 from rhythmid.diagnose.joints.equivalents import equivalent_names, equivalents
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.link_centre import feels
-from rhythmid.diagnose.joints.link_evidence import weight_of_joints, weight_of_values
 from rhythmid.diagnose.joints.misfit import braking, misfits
 from rhythmid.diagnose.joints.stated_fit import stated_fit
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
-from rhythmid.diagnose.rejections import decisive
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.joints.held_reference import balances_of, likely_readings
@@ -186,8 +186,7 @@ def _explained(
 ) -> _Explained:  # fmt: skip
     """Search every joint whose effort has its sign, correct a link's mass or inertia where one is found, and search the joints that feel it again.
 
-    A correction takes about so many seconds. Of the joints that feel it those come first whose efforts, with the effects that are known there,
-    contradict it: only a further effect could reconcile them. If they do not find one, it is refuted, and the other joints keep their results.
+    A correction takes about so many seconds.
     """
     links: dict[str, WrongLink] = {}
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
@@ -213,21 +212,18 @@ def _explained(
             again = [joint for joint in joints if feels(changed, joint, split(link)[0])]
             seen = JointBalances.of(tried, holdout, changed) if holdout else None
             late = reference_delay(changed, changed.computed) if changed.computed else None
-            weight = {one: weight_of_values(found, balances, changed, [one]) for one in again if one in found}
-            first = [joint for joint in weight if weight[joint] < 0.0]
-            rest = [joint for joint in again if joint not in first]
-            better, refused_now = _searched(
-                changed, seen, first, catalogue, tell, budget, late, waiting=len(rest)
+            search = partial(
+                _searched, changed, seen, catalogue=catalogue, tell=tell, budget=budget, delay=late
             )
-            others = sum(one for one in weight.values() if one >= 0.0)
-            refuted = others + weight_of_joints(found, better, first) < -decisive(1)
+            refuted, (better, refused_now) = contradicted(found, balances, changed, again, search)
         if refuted:
             tell(f"{link} of {result.joint} is refuted by the joints that it moves")
             balances = JointBalances.of(machine, records, balances.without(result.joint, link))
             unseen = JointBalances.of(machine, holdout, balances) if holdout else None
             better, refused_now = _searched(balances, unseen, [result.joint], catalogue, tell, budget, delay)
         else:
-            more, refused_too = _searched(changed, seen, rest, catalogue, tell, budget, late)
+            rest = [joint for joint in again if joint not in better]
+            more, refused_too = search(rest)
             better, refused_now = {**better, **more}, {**refused_now, **refused_too}
             links[wrong.parameter] = wrong
             machine, balances, delay, unseen = tried, changed, late, seen
@@ -238,7 +234,7 @@ def _explained(
 def _searched(
     balances: JointBalances, unseen: JointBalances | None, joints: Sequence[str], catalogue: Catalogue,
     tell: Tell, budget: Budget, delay: ReferenceDelay | None, end: float = EXPLAINED, waiting: int = 0,
-) -> tuple[dict[str, JointResult], dict[str, str]]:  # fmt: skip
+) -> Searched:  # fmt: skip
     """The results of joints, and the reasons for those that cannot be judged. They share the time until this share of the budget has passed
     with so many joints that are `waiting`: each has the same part of what those before it have left, in which it is also weighed."""
     found: dict[str, JointResult] = {}
