@@ -1,5 +1,6 @@
 """What an identification of several joints says of itself where it predicts neither motion nor effort."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from legged import fixed_leg, recorded, references
 from rich.console import Console
 
 from rhythmid.body.machine import Machine
-from rhythmid.identify.joints.joint_identification import identify_machine, poor_joints
+from rhythmid.identify.joints.joint_identification import JointEstimate, identify_machine, poor_joints
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Channel
 
@@ -47,14 +48,17 @@ def test_a_fit_that_predicts_neither_motion_nor_effort_of_a_joint_is_not_usable(
     found = identify_machine([broken(swung(leg), knee=0.5)], leg)
     assert found.not_identified == ("knee",) == tuple(found.to_dict()["quality"]["not_identified"])
     assert not found.usable and found.to_dict()["usable"] is False
-    assert found.headline == "Not identified: knee: neither motion nor effort is predicted"
+    assert found.headline == "Not identified: knee: more than 20 % of the effort and of the motion is missed"
     console = Console(width=300, record=True, file=None, quiet=False)
     with console.capture() as printed:
         found.show(console)
-    first = printed.get().splitlines()[0]
+    first, *rest = printed.get().splitlines()
     assert first.startswith(
-        "not identified: the identified values predict neither the motion nor the effort of knee"
+        "not identified: knee: more than 20 % of the effort and of the motion is missed, so none"
     )
+    # the values of the hip can be used
+    assert any("parameters; those of knee are not usable" in line for line in rest)
+    assert not any("of a fit that is not usable" in line for line in rest)
 
 
 def test_a_joint_whose_effort_or_motion_is_predicted_is_identified():
@@ -77,3 +81,12 @@ def test_a_usable_identification_says_so(leg: Machine):
     found = identify_machine([swung(leg)], leg)
     assert found.usable and found.to_dict()["usable"] is True
     assert not any("diverges" in note for note in found.notes)
+
+
+def test_an_interval_ends_at_the_bound_of_its_value_and_says_so():
+    damping = JointEstimate(0.0, 3.0, "N*m*s/rad", (0.0, math.inf))
+    assert damping.at_bound and damping.to_dict()["at_bound"] is True
+    assert damping.interval == (0.0, pytest.approx(5.88, abs=0.01))
+    free = JointEstimate(1.0, 3.0, "N*m*s/rad", (0.0, math.inf))
+    assert not free.at_bound and free.interval[0] == 0.0
+    assert JointEstimate(1.0, 3.0, "rad").interval[0] < 0.0

@@ -1,12 +1,17 @@
 """What is said of the joints of a machine at which the records do not decide."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
+import pytest
 from answers import diagnosed
 
+from rhythmid.diagnose.answer.compose_effort import FIXED_SCALE
 from rhythmid.diagnose.answer.result import FitQuality
+from rhythmid.diagnose.joints.equivalents import probability_together
 from rhythmid.diagnose.joints.joint_answer import JointEffect
-from rhythmid.diagnose.joints.joint_compose import summary_of_joints
+from rhythmid.diagnose.joints.joint_compose import COMPUTED, assumptions_of, summary_of_joints
 
 
 def test_each_joint_is_told_with_its_own_rivals():
@@ -22,7 +27,7 @@ def test_each_joint_is_told_with_its_own_rivals():
 def test_an_effect_that_others_replace_is_told_with_them_and_a_certain_one_alone():
     alike = (("constant_force", "linear_spring", "pendulum_gravity"),)
     answers = {"knee": replace(diagnosed("undecided"), indistinguishable=alike)}
-    effect = JointEffect("knee", "constant_force", "force", "F = F₀", 0.9, 0.3, {}, 0.2)
+    effect = JointEffect("knee", "constant_force", "force", "F = F₀", 0.9, 0.3, {}, 0.2, together=0.85)
     assert summary_of_joints([effect], (), (), answers, {}) == (
         "The model is wrong at knee: constant force or linear spring or pendulum gravity."
     )
@@ -62,3 +67,47 @@ def test_the_quantities_of_a_link_are_told_together_where_one_of_them_is_surely_
     assert summary_of_joints([faint], (), (), answers, {"shank": ("link_mass", "payload")}) == (
         "In doubt: knee: the mass of shank (probability 0.30)."
     )
+
+
+def test_names_that_are_together_improbable_are_in_doubt_whatever_they_share():
+    alike = (("stribeck_friction", "coulomb_friction"),)
+    answers = {"knee": replace(diagnosed("undecided"), indistinguishable=alike)}
+    effect = JointEffect("knee", "stribeck_friction", "force", "F", 1.0, 0.29, {}, 0.05, together=0.55)
+    assert summary_of_joints([effect], (), (), answers, {}) == (
+        "In doubt: knee: Stribeck friction or Coulomb friction (probability 0.55 together)."
+    )
+
+
+def test_the_names_of_a_group_have_its_evidence_times_the_chance_that_they_are_laws_at_all():
+    weight = {"stribeck_friction": 0.5, "coulomb_friction": 0.3, "linear_spring": 0.2}
+    rivals = [SimpleNamespace(key=(one,), elements=(one,), names=(one,)) for one in weight]
+    chosen = SimpleNamespace(
+        elements=("stribeck_friction",), names=("stribeck_friction",), richer={}, key=("stribeck_friction",)
+    )
+    decision = SimpleNamespace(
+        probability={"stribeck_friction": 0.4},  # 0.8 of its evidence of 0.5
+        weights={(one,): held for one, held in weight.items()},
+        equivalent=(("stribeck_friction", "coulomb_friction"),),
+    )
+    result = SimpleNamespace(
+        decision=decision,
+        contest=SimpleNamespace(hypotheses=rivals),
+        selection=SimpleNamespace(chosen=chosen),
+    )
+    joint: Any = SimpleNamespace(joint="knee", result=result, rotors=())
+    assert probability_together(joint, "stribeck_friction") == pytest.approx(0.8 * (0.5 + 0.3))
+
+
+def test_an_effort_that_was_computed_is_not_said_to_be_recorded():
+    answers = {
+        joint: replace(diagnosed("consistent"), assumptions=(FIXED_SCALE,)) for joint in ("hip", "knee")
+    }
+    machine: Any = SimpleNamespace(body=SimpleNamespace(contacts=False))
+
+    def said(*computed: str) -> tuple[str, ...]:
+        found: Any = {joint: SimpleNamespace(by_reference=joint in computed) for joint in answers}
+        return assumptions_of(machine, found, answers)
+
+    assert said() == (FIXED_SCALE,)
+    assert said("knee") == (FIXED_SCALE, COMPUTED.format("knee"))
+    assert said("hip", "knee") == (COMPUTED.format("hip, knee"),)

@@ -19,7 +19,7 @@ def test_a_joint_is_told_whose_effort_neither_the_body_nor_the_names_explain(
 ):
     fit = {"refitted_nominal": FitQuality(0.1, nominal), "augmented": FitQuality(0.1, named)}
     answers = {"hip": diagnosed("consistent"), "knee": replace(diagnosed("undecided"), fit=fit)}
-    notes = list(misfits(answers))
+    notes = list(misfits(answers, {}))
     assert len(notes) == told
     if told:
         assert notes[0].startswith(
@@ -30,5 +30,5 @@ def test_a_joint_is_told_whose_effort_neither_the_body_nor_the_names_explain(
 
 def test_without_held_out_data_the_error_of_the_fit_tells_it():
     fit = {"refitted_nominal": FitQuality(1.2, None), "augmented": FitQuality(1.1, None)}
-    (note,) = misfits({"knee": replace(diagnosed("undecided"), fit=fit)})
+    (note,) = misfits({"knee": replace(diagnosed("undecided"), fit=fit)}, {})
     assert "120 %" in note and "110 %" in note

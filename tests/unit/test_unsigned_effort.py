@@ -4,9 +4,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from legged import TWO_LINKS
 
+from rhythmid.body.machine import Machine
+from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.errors import InputError
 from rhythmid.record.bag_report import quality_report
-from rhythmid.record.unsigned import is_unsigned
+from rhythmid.record.joint_record import JointSignals, load_joint_records
+from rhythmid.record.unsigned import WHY, is_unsigned, unsigned_joints
+from rhythmid.start.robot import start_robot
 from rhythmid.start.start import guess
 
 TIME = 0.05 * np.arange(3000)
@@ -64,3 +71,52 @@ def test_init_says_that_a_current_has_no_sign_and_does_not_take_it(tmp_path: Pat
     signals.write_text("time: {column: t}\n" + channels)
     notes = quality_report(path, signals).notes
     assert [note for note in notes if note.startswith("effort: it is no effort as it was recorded")]
+
+
+def test_the_size_of_a_controllers_error_is_unsigned_and_what_holds_a_weight_is_not() -> None:
+    command = np.interp(TIME + 0.1, TIME, POSITION)
+    steps = command + 0.3 * np.sign(np.sin(0.31 * TIME))  # an error that the motion alone does not tell
+    size = np.abs(steps - COARSE) + 0.01 * np.abs(NOISE)
+    assert is_unsigned(TIME, COARSE, size, steps)
+    assert not is_unsigned(TIME, COARSE, 3.0 + steps - COARSE, steps)
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    """A folder with the table of two joints whose efforts are the sizes of their controllers' errors."""
+    (tmp_path / "two.urdf").write_text(TWO_LINKS)
+    other = np.sin(0.9 * TIME + 1.0) + 0.4 * np.sin(1.7 * TIME)
+    columns, heading = [TIME], ["time"]
+    for joint, position in (("one", POSITION), ("two", other)):
+        command = np.interp(TIME + 0.1, TIME, position)
+        columns += [position, command, 5.0 * np.abs(command - position)]
+        heading += [f"{joint}_{what}" for what in ("pos", "cmd", "torque")]
+    path = tmp_path / "run.csv"
+    np.savetxt(
+        path, np.column_stack(columns), delimiter=",", header=",".join(heading), comments="", fmt="%.6g"
+    )
+    return path
+
+
+def test_init_of_a_robot_does_not_take_efforts_without_signs(arm: Path) -> None:
+    found = start_robot([arm], arm.parent / "two.urdf", arm.parent, None, load_catalogue())
+    assert "effort:" not in found.signals.replace("# ", "") and "kind: reference" in found.signals
+    (said,) = [line for line in found.lines() if WHY in line]
+    assert said.startswith("CHECK *_torque is not used, at one, two: ")
+
+
+def test_check_and_diagnose_of_a_robot_say_in_the_same_words_that_efforts_have_no_signs(arm: Path) -> None:
+    signals = arm.parent / "signals.yaml"
+    signals.write_text(
+        'joints: [one, two]\ntime: {column: time}\noutput: {column: "*_pos"}\n'
+        'input: {column: "*_cmd", kind: reference}\neffort: {column: "*_torque"}\n'
+    )
+    model = arm.parent / "model.yaml"
+    path = "{force: [{viscous_damper: {damping: 0.1}}]}"
+    model.write_text(f"body: {{urdf: two.urdf, contacts: false}}\njoints:\n  one: {path}\n  two: {path}\n")
+    said = f"effort: {WHY}"
+    records = load_joint_records([arm], JointSignals.load(signals))
+    assert unsigned_joints(records) == {"one": said, "two": said}
+    assert f"one, two: {said}" in quality_report(arm, signals).notes
+    with pytest.raises(InputError, match=f"no joint can be judged: one, two: {said}"):
+        diagnose_machine(records, Machine.load(model))

@@ -34,6 +34,17 @@ class Budget:
         """Whether this share of the budget has passed."""
         return time.monotonic() > self.at(share)
 
+    def part(self, share: float, parts: int) -> "Budget":
+        """The budget of one of `parts` equal parts of the time that is left until this share has passed; without a limit as this one."""
+        if self.seconds is None:
+            return self
+        now = time.monotonic()
+        return Budget(max(self.at(share) - now, 0.0) / parts, now)
+
+    def allows(self, seconds: float, share: float) -> bool:
+        """Whether what takes so long would end before this share of the budget has passed."""
+        return time.monotonic() + seconds <= self.at(share)
+
     @property
     def spent(self) -> bool:
         """Whether the search must not begin anything new."""

@@ -1,7 +1,8 @@
 """Data-quality report of a recording: rate, jitter, gaps and lateness of every topic, and the mapped channels."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from rhythmid.record.block import Block
 from rhythmid.record.cleaning import LeftOut, cleaned, peak_note
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.gaps import Cut, cut_at_gaps
+from rhythmid.record.joint_notes import notes_of_joints
 from rhythmid.record.joint_record import JointSignals, names_joints, read_joint_record
 from rhythmid.record.message_types import stamp_path
 from rhythmid.record.other_lengths import read_length_notes
@@ -207,12 +209,11 @@ def quality_report(
             named = Signals.load(source) if source.suffix in (".yaml", ".yml") else signals
             notes += [] if named is None else read_length_notes(source, named)
             notes += [] if named is None else read_clock_notes(source, named)
+        notes += _of_channels(parts)
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
-            notes += [note for note in one.quality.notes if note not in notes]
             wrapped = wrap_notes(one)  # they are removed and change no result
             assumed += [*one.quality.assumed, *(f"{begin or f'{one.name}: '}{note}" for note in wrapped)]
-            notes += [f"{begin}{note}" for note in (*copy_notes(one), *unsigned_notes(one))]
             notes += [f"{begin}{note}" for note in (*wrapped, *rest_notes(one)) if begin]
             if begin and (still := standstill(one)) is not None:
                 notes.append(f"{begin}output: {still}")
@@ -262,6 +263,22 @@ def quality_report(
         source, size, duration, topics, channels, bag.truncated, tuple(problems), tuple(notes), damage, record,
         left_out, cut, assumed=tuple(assumed),
     )  # fmt: skip
+
+
+def _of_channels(parts: Mapping[str, Record]) -> list[str]:
+    """Notes on the channels of each part, with its joints; what is told of the channels of all parts alike concerns the recording."""
+    said = {begin: one.quality.notes for begin, one in parts.items()}
+    own = {begin: [*copy_notes(one), *unsigned_notes(one)] for begin, one in parts.items()}
+    if "" in parts:
+        return [*said[""], *own[""]]
+    alike = [
+        note for note in dict.fromkeys(chain(*said.values())) if all(note in one for one in said.values())
+    ]
+    of_joints = {
+        begin.rstrip("."): [note for note in (*said[begin], *own[begin]) if note not in alike]
+        for begin in parts
+    }
+    return alike + notes_of_joints(of_joints)
 
 
 def _tables(source: Path, signals: Signals | JointSignals | None) -> tuple[int, int]:

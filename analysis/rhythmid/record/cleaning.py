@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.angle_wrap import unwrapped, wrap_notes
+from rhythmid.record.joint_notes import notes_of_joints
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.outlier import outlying_samples, repeated_samples
 from rhythmid.record.quality import clipped_samples
@@ -136,11 +137,9 @@ def cleaned_joints(records: Sequence[JointRecord]) -> tuple[list[JointRecord], t
     for whole in records:
         joints = {joint: cleaned(record) for joint, record in whole.joints.items()}
         base = None if whole.base is None else cleaned(whole.base)
-        notes += [
-            f"{whole.name}, {'base' if joint is None else joint}: {words}"
-            for joint, found in (*joints.items(), *([] if base is None else [(None, base)]))
-            for words in found.words
-        ]
+        parts = joints if base is None else {**joints, "base": base}
+        told = notes_of_joints({joint: found.words for joint, found in parts.items()})
+        notes += [f"{whole.name}, {words}" for words in told]
         made.append(
             replace(
                 whole,

@@ -1,13 +1,17 @@
 """Detects an unsigned effort: a current or load of which only the magnitude was recorded, as many motor drivers do.
 
 It never changes its sign although the motion reverses. An effort that holds a weight does not, either, but it is
-correlated with the direction of the motion (friction), with position and acceleration. So is, where it acts, an
-effort that can only push. An unsigned effort is correlated with the magnitudes of these.
+correlated with the direction of the motion (friction), with position and acceleration, and where a controller makes it, with
+the error between reference and position. So is, where it acts, an effort that can only push. An unsigned effort is correlated with the
+magnitudes of these.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
@@ -22,8 +26,8 @@ BETTER_LAW_SHARE = 0.8
 ROUNDS = 10
 AVERAGED = 2  # samples on either side averaged for the speed of a coarsely read motion
 WHY = (
-    "it is no effort as it was recorded: it never changes its sign though the motion reverses, and goes with the sizes of speed and "
-    "acceleration, not with their directions; record it with its sign"
+    "it is no effort as it was recorded: it never changes its sign though the motion reverses, and goes with the sizes of speed, "
+    "acceleration or control error, not with their directions; record it with its sign"
 )
 
 
@@ -32,17 +36,38 @@ def unsigned_notes(record: Record) -> list[str]:
     if record.output_kind != "position":
         return []
     output, found = record.output, list[str]()
+    asked = _asked(record)
     for role, channel in (("input", record.input), ("effort", record.effort)):
         if channel is None or (role == "input" and record.input_kind != "force"):
             continue
         at_once = np.interp(output.time, channel.time, channel.value)
-        if is_unsigned(output.time, output.value, at_once):
+        if is_unsigned(output.time, output.value, at_once, asked):
             found.append(f"{role}: {WHY}")
     return found
 
 
-def is_unsigned(time: Array, position: Array, effort: Array) -> bool:
-    """Whether an effort (n,) is that of a motion (n,) without its sign."""
+def unsigned_joints(records: Sequence[JointRecord]) -> dict[str, str]:
+    """The joints whose efforts were recorded without their sign in all records, with the reason; none where no record is given."""
+    found: dict[str, list[Record]] = {}
+    for one in records:
+        for joint, own in one.joints.items():
+            found.setdefault(joint, []).append(own)
+    return {
+        joint: f"effort: {WHY}"
+        for joint, runs in found.items()
+        if all(f"effort: {WHY}" in unsigned_notes(one) for one in runs)
+    }
+
+
+def _asked(record: Record) -> Array | None:
+    """Reference (n,) of the position at the samples of the output; None where there is none."""
+    if record.input is None or record.input_kind != "reference":
+        return None
+    return np.interp(record.output.time, record.input.time, record.input.value)
+
+
+def is_unsigned(time: Array, position: Array, effort: Array, reference: Array | None = None) -> bool:
+    """Whether an effort (n,) is that of a motion (n,) without its sign; `reference` (n,) is what a controller was asked for."""
     if len(time) < LEAST_SAMPLES or not np.isfinite(position).all() or not np.isfinite(effort).all():
         return False
     if effort.min() < 0.0 < effort.max() or np.ptp(effort) == 0.0:
@@ -54,10 +79,14 @@ def is_unsigned(time: Array, position: Array, effort: Array) -> bool:
     acceleration = np.gradient(_mean(speed), time)
     way = np.tanh(speed / least)
     terms = np.column_stack([np.ones(len(time)), position - position.mean(), speed, way, acceleration])
+    signs = [way, acceleration, position - position.mean()]
+    if reference is not None and np.isfinite(reference).all():
+        terms = np.column_stack([terms, reference - position])
+        signs.append(reference - position)
     signed = _left(effort, _law(terms, effort))
     signed = min(signed, _left(np.abs(effort), _one_sided(terms, np.abs(effort))))
     sizes = _left(effort, _law(np.column_stack([terms[:, :2], np.abs(terms[:, 2:])]), effort))
-    for column in (way, acceleration, position - position.mean()):
+    for column in signs:
         sizes = min(sizes, _left(np.abs(effort), _size_of_law(terms, np.abs(effort), np.sign(column))))
     return sizes <= min(1.0 - LEAST_SHARE_TOLD, BETTER_LAW_SHARE * signed)
 

@@ -67,7 +67,7 @@ def joint_identification_page(
     worst = max(result["quality"]["effort_nrmse"].items(), key=lambda one: one[1])
     verdict = f"Not identified: {', '.join(poor)}" if poor else f"{len(result['parameters'])} parameters identified"  # fmt: skip
     words = (
-        "The identified values predict neither the motion nor the effort of these joints, so none of theirs can be used."
+        "The identified values miss too much of the effort and of the motion of these joints, so none of their values can be used."
         if poor
         else f"The identified machine misses {percent(worst[1])} of the effort at most, at {worst[0]}."
     )

@@ -6,8 +6,8 @@ number, or entries of an array.
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from rhythmid.record.inventory import Inventory, Recorded
 from rhythmid.start.meaning import Quantity, meaning_of, words_of
@@ -76,6 +76,18 @@ def families_of(found: Inventory, joints: Sequence[str]) -> Iterator[Family]:
         if len(left) > 1 or (left and told):
             used |= {(topic, id(one)) for one in left.values()}
             yield Family(topic, pattern, left, told)
+
+
+def with_constants(family: Family, found: Inventory, joints: Collection[str]) -> Family:
+    """The family with the numbers of these joints that never change, as the effort of a joint without a motor."""
+    still = {
+        name: one
+        for one in found.constant
+        for topic, pattern, name, told in _patterns(one, list(joints))
+        if (topic, pattern, told) == (family.topic, family.pattern, family.told)
+        and name in joints and name not in family.members
+    }  # fmt: skip
+    return replace(family, members={**family.members, **still}) if still else family
 
 
 def _patterns(one: Recorded, joints: Sequence[str]) -> Iterator[tuple[str, str, str, bool]]:

@@ -21,8 +21,9 @@ from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, header_clock, inventory
 from rhythmid.record.joint_record import JointSignals, load_joint_records
 from rhythmid.start.drivers import not_read
-from rhythmid.start.families import GENERIC, Family, families_of, joints_of
+from rhythmid.start.families import GENERIC, Family, families_of, joints_of, with_constants
 from rhythmid.start.meaning import Quantity, meaning_of, says_it_was_read, words_of
+from rhythmid.start.unsigned_effort import unsigned_family
 from rhythmid.start.yaml_text import GUESSED, as_guessed, comment, time_of
 
 CURRENTS = frozenset(
@@ -76,7 +77,8 @@ def start_robot(
             f"its joints: {', '.join(robot.joints)}"
         )
     joints = joints_of(list(robot.joints), list(output.members), output.told)
-    effort, others = _effort(families, output)
+    families = [one if one is output else with_constants(one, found, output.members) for one in families]
+    effort, others, unsigned = _effort(families, output)
     reference = _beside(families, "position", True, output)
     command = _beside(families, "effort", True, output)
     forward = command if reference is not None else None
@@ -85,7 +87,7 @@ def start_robot(
     if effort is None and reference is None:
         raise InputError(
             f"{found.path}: neither efforts nor references of {', '.join(output.members)} are among "
-            f"{', '.join(one.pattern for one in families)}{_other_numbers(families, output)}"
+            f"{', '.join(one.pattern for one in families)}{_other_numbers(families, output)}{'; '.join(['', *unsigned])}"
         )
     told = [_line("output", output, found.is_bag, joints)]
     told += [
@@ -93,7 +95,7 @@ def start_robot(
         for role, one in (("effort", effort), ("input", reference))
         if one
     ]
-    of_effort = _doubts_of_effort(effort, others, command)
+    of_effort = [*unsigned, *_doubts_of_effort(effort, others, command)]
     signals, doubts = _signals(found, joints, output, effort, reference, forward, of_effort)
     with as_guessed():
         records = load_joint_records(sources, JointSignals.from_text(signals, GUESSED))
@@ -145,12 +147,15 @@ def _all_beside(
     )  # fmt: skip
 
 
-def _effort(families: Sequence[Family], output: Family) -> tuple[Family | None, list[Family]]:
-    """The effort that was not commanded, preferably a sensor reading, and the other efforts."""
+def _effort(families: Sequence[Family], output: Family) -> tuple[Family | None, list[Family], list[str]]:
+    """The effort that was not commanded, preferably a sensor reading; the other efforts; and a note on each effort without its sign."""
     able = sorted(
         _all_beside(families, "effort", False, output), key=lambda one: not says_it_was_read(one.first)
     )
-    return (able[0] if able else None), able[1:]
+    references = list(_all_beside(families, "position", True, output))
+    notes = {one.pattern: unsigned_family(one, output, references[:1]) for one in able}
+    able = [one for one in able if not notes[one.pattern]]
+    return (able[0] if able else None), able[1:], [note for note in notes.values() if note]
 
 
 def _other_numbers(families: Sequence[Family], output: Family) -> str:
@@ -179,6 +184,8 @@ def _doubts_of_effort(effort: Family | None, others: Sequence[Family], command: 
             "effort: no other one was recorded than what the actuators were asked for, which they may not have made"
         ]
     doubts: list[str] = []
+    if still := [name for name, one in effort.members.items() if not np.any(one.value)]:
+        doubts.append(f"effort: that of {', '.join(still)} is always 0, as where no motor acts")
     if not effort.first.unit and CURRENTS & set(words_of(effort.pattern.lower())):
         doubts.append(
             f"effort: {effort.pattern} is called a current; where it is in A, give it the torque or force of one ampere at each joint, such as  "
@@ -241,7 +248,10 @@ def _signals(
             *comment("what the robot's controllers are asked for."),
             f"input: {{{reference.channel(bag)}, kind: reference{extra}}}",
         ]
-    if effort is not None:
+    if effort is None:
+        doubts += of_effort
+        lines += [line for doubt in of_effort for line in comment(f"CHECK {doubt}.")]
+    else:
         doubts.append(
             "effort: whether it was recorded before the actuator or at the joint, and as a mean or at an instant, is not told"
         )

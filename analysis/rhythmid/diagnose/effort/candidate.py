@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 SEEN = ("force", "actuator")  # slots whose elements show in the effort balance
 # the same where a controller computes the effort from its reference
 SEEN_BY_REFERENCE = (*SEEN, "command")
+NO_MOTOR = "it acts on the force of an actuator, and the effort that was recorded is zero: no motor acts"
 LARGEST = 30.0  # largest start of an effect, times its first guess
 LEAST_START = (
     0.05  # smallest start, share of its first guess: at zero the effect's shape parameters have no derivative
@@ -55,13 +56,15 @@ def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
     for element, values in candidates(catalogue.within(sizes), model.setting, sizes).tried:
         if not _seen(element, balance):
             continue
-        if driven and (element.slot == "actuator" or element.acts == "drive"):
+        if (driven or balance.undriven) and element.slot == "actuator":
+            continue
+        if driven and element.acts == "drive":
             continue
         found.append(Start("effects", element.name, element, values))
     found += [
         Start("freed_value", name, None, {name: model.value(name)}) for name in fixed_values(balance, model)
     ]
-    if not driven:
+    if not (driven or balance.undriven):
         found.append(Start("delay", INPUT_DELAY, None, {}))
     return found
 
@@ -86,7 +89,11 @@ def not_tried(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
     """
     reasons = dict(candidates(catalogue.within(sizes), model.setting, sizes).not_tried)
     for element in catalogue.values():
-        if not element.candidate or _seen(element, balance):
+        if not element.candidate:
+            continue
+        if _seen(element, balance):
+            if balance.undriven and element.slot == "actuator":
+                reasons[element.name] = NO_MOTOR
             continue
         if element.slot not in SEEN:
             reasons[element.name] = f"it acts in the {element.slot} path, which the effort does not show"
@@ -101,14 +108,16 @@ def fixed_values(balance: Balance, model: Model) -> list[str]:
     """Fixed values of the model that the effort can determine.
 
     Left out are choices of form (an exponent, a side) and zeros of elements, which the file may not have meant. A link's
-    zero payload is kept, because it is meant.
+    zero payload is kept, because it is meant. Where no motor acts, the forces of the body balance one another, and no effort tells their
+    size: there masses that are freed one after another make all of them vanish, and links are left to the joints that are driven.
     """
     links = balance.motions[0].links
     freed = {
         n
         for n, value in model.parameters.items()
         if value.fixed and (value.value != 0.0 or n in links) and n != INERTIA
-    }
+        and not (balance.undriven and n in links)
+    }  # fmt: skip
     forms = {f"{t.label}.{p.name}" for t in model.terms for p in t.element.parameters if p.fixed}
     open_model = with_freed(model, freed - forms)
     names = [name for name in balance.estimated(open_model) if name in freed - forms]

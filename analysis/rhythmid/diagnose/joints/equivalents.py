@@ -6,6 +6,7 @@ turns about one fixed axis is exactly equivalent to that of the rotor, so that n
 
 from rhythmid.body.body import BODY
 from rhythmid.diagnose.joints.joint_case import JointResult, name_of
+from rhythmid.diagnose.probability import joint_probability
 from rhythmid.diagnose.selection import equivalent
 from rhythmid.model import INERTIA
 from rhythmid.simulation.transport import INPUT_DELAY
@@ -42,6 +43,19 @@ def equivalent_names(one: JointResult) -> tuple[tuple[str, ...], ...]:
 def shared_among(one: JointResult, label: str) -> int:
     """Number of equivalent names, untested against one another, among which the probability of one name is shared."""
     return 1 + len(one.rotors) if label == INERTIA else 1
+
+
+def probability_together(one: JointResult, label: str) -> float:
+    """Probability that a chosen effect of a joint, or one of the names in its place, is what the path lacks.
+
+    They share the chance that the effect is a law at all; what they hold of the evidence adds up.
+    """
+    decision, contest, chosen = one.result.decision, one.result.contest, one.result.selection.chosen
+    name = dict(zip(chosen.elements, chosen.names, strict=True))[label]
+    own = joint_probability([name], contest, chosen, decision.weights)
+    alike = {name, *chosen.richer.get(name, ())}.union(*(g for g in equivalents(one) if g[0] == name))
+    held = sum(decision.weights.get(h.key, 0.0) for h in contest.hypotheses if alike & set(h.names))
+    return min(decision.probability[label] * max(held / own, 1.0), 1.0) if own > 0.0 else 0.0
 
 
 def _of_body(label: str) -> bool:

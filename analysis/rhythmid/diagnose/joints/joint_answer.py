@@ -18,7 +18,7 @@ class JointEffect:
 
     For a link's mass, inertia, centre of mass or payload, `link` names the link, and the joint is the one that moves it. `share` is relative to
     the joint's mismatch. `heldout_gain` is the reduction of the joint's error on data that no fit has seen, as a share of the
-    effort.
+    effort. `together` is the probability that the effect, or one of those listed in its place, is missing.
     """
 
     joint: str
@@ -30,6 +30,7 @@ class JointEffect:
     parameters: dict[str, Estimate]
     heldout_gain: float
     link: str | None = None
+    together: float = 0.0
 
     @property
     def of_link(self) -> str:

@@ -6,10 +6,11 @@ from dataclasses import replace
 from rhythmid.body.body import BODY
 from rhythmid.body.inertial_parameter import split
 from rhythmid.body.machine import Machine
+from rhythmid.diagnose.answer.compose_effort import FIXED_SCALE
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
 from rhythmid.diagnose.constants import BLIND, STATED
 from rhythmid.diagnose.hypothesis import Verdict
-from rhythmid.diagnose.joints.equivalents import shared_among
+from rhythmid.diagnose.joints.equivalents import probability_together, shared_among
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import OF_LINKS, JointResult, name_of
 from rhythmid.diagnose.joints.misfit import error_of
@@ -102,7 +103,7 @@ def compose_machine(
         joints=dict(answers),
         not_judged=dict(refused),
         families={joint: one.families for joint, one in answers.items() if one.families},
-        assumptions=_assumptions(machine, found, answers),
+        assumptions=assumptions_of(machine, found, answers),
         notes=tuple(notes),
         reference_delay=delay,
     )
@@ -128,6 +129,7 @@ def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
         decision.probability[label] / shared_among(one, label),
         parameters,
         gain,
+        together=probability_together(one, label),
     )
 
 
@@ -170,6 +172,7 @@ def _link(machine: Machine, wrong: WrongLink, same: Sequence[WrongLink]) -> Join
     return JointEffect(
         machine.body.joint_of(name), element, slot, equation, decision.shares[label],
         decision.probability[label] / (len(same) + len(wrong.alike)), dict(wrong.values), _gain(one), name,
+        probability_together(one, label),
     )  # fmt: skip
 
 
@@ -197,13 +200,14 @@ def summary_of_joints(
     for one in missing:
         if one.link and one.link in told:
             continue
-        what = _in_words(one)
-        if not _holds(one, answers, of_links):
-            doubted.append(f"{one.joint}: {what} (probability {one.probability:.2f})")
-            continue
         others = [] if one.probability >= STATED else _in_its_place(one, answers, of_links)
+        what = " or ".join([_in_words(one), *others])
+        if not _holds(one, answers, of_links):
+            chance = f"{one.together:.2f} together" if others else f"{one.probability:.2f}"
+            doubted.append(f"{one.joint}: {what} (probability {chance})")
+            continue
         told |= {one.link} if one.link else set()
-        said.append(f"{one.joint}: {' or '.join([what, *others])}")
+        said.append(f"{one.joint}: {what}")
     words = f"The model is wrong at {'; '.join(said)}." if said else ""
     words += f" In doubt: {'; '.join(doubted)}." if doubted else ""
     for why, joints in _alike(unknown, answers).items():
@@ -224,7 +228,8 @@ def _holds(one: JointEffect, answers: Mapping[str, Diagnosis], of_links: Mapping
     may be the best of several wrong explanations.
     """
     answer = answers.get(one.joint)
-    if one.probability < STATED and not _in_its_place(one, answers, of_links):
+    same = of_links.get(one.link, ()) if one.link else ()
+    if max(one.probability * max(len(same), 1), one.together) < STATED:
         return False
     return answer is None or answer.verdict == "missing_physics" or error_of(answer.fit["augmented"]) < BLIND
 
@@ -274,13 +279,16 @@ def _next(
     return next(iter(answers.values())).next_experiment
 
 
-def _assumptions(
+def assumptions_of(
     machine: Machine, found: Mapping[str, JointResult], answers: Mapping[str, Diagnosis]
 ) -> tuple[str, ...]:
+    """What is assumed; of the scale of a recorded effort only where one was recorded."""
+    late = [joint for joint, one in found.items() if one.by_reference]
     said = list(next(iter(answers.values())).assumptions)
+    if len(late) == len(found):
+        said = [line for line in said if line != FIXED_SCALE]
     if machine.body.contacts:
         said.append(IN_CONTACT)
-    late = [joint for joint, one in found.items() if one.by_reference]
     if late:
         said.append(COMPUTED.format(", ".join(late)))
     return tuple(said)

@@ -6,8 +6,10 @@ carries it. If one is found, it is corrected, and the joints that feel it are se
 """
 
 import math
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rhythmid.body.body import BODY
@@ -15,19 +17,18 @@ from rhythmid.body.inertial_parameter import MASS, PAYLOAD, TURNING, split
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
-from rhythmid.diagnose.case import Budget
+from rhythmid.diagnose.case import EXPLAINED, SEARCHED, WEIGHED, Budget
 from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.joints.contradiction import Searched, contradicted
 from rhythmid.diagnose.joints.equivalents import equivalent_names, equivalents
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.link_centre import feels
-from rhythmid.diagnose.joints.link_evidence import weight_of_joints
-from rhythmid.diagnose.joints.misfit import misfits
+from rhythmid.diagnose.joints.misfit import braking, misfits
 from rhythmid.diagnose.joints.stated_fit import stated_fit
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
-from rhythmid.diagnose.rejections import decisive
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.joints.held_reference import balances_of, likely_readings
@@ -40,6 +41,7 @@ from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.same_recording import check_held_out
+from rhythmid.record.unsigned import unsigned_joints
 from rhythmid.result import Result, Row
 from rhythmid.simulation.transport import INPUT_DELAY
 
@@ -51,6 +53,8 @@ MOST_LINKS = 2
 # share of the given mass of a link, below which another effect has absorbed it. An inertia in a file may be that about the joint,
 # of which the inertia about the centre of mass may be any share
 LIGHTEST = 0.1
+# time of the correction of a link's value, in times that the balances of all joints take (measured: 20 for an arm of seven joints)
+CORRECTION = 20.0
 MATTERS = 0.02  # smallest change of a mass or an inertia that an effort balance resolves, as a share of it
 
 
@@ -109,21 +113,36 @@ def diagnose_machine(
     records, said = cleaned_joints(records)
     holdout, of_holdout = cleaned_joints(holdout)
     check_joints(machine, records)
+    began = time.monotonic()
     balances = balances_of(machine, records)
+    correction = CORRECTION * (time.monotonic() - began)
+    unsigned = unsigned_joints(records)
     best = None
     for reading in likely_readings(balances, records):
-        tried = _explained(machine, reading, records, holdout, known, tell, spent)
+        tried = _explained(machine, reading, records, holdout, known, tell, spent, unsigned, correction)
         best = tried if best is None or tried.causes < best.causes else best
         if best.causes <= 1 or spent.spent:
             break
     assert best is not None  # there is at least one reading
     if not best.found:
-        raise InputError(f"no joint can be judged: {next(iter(best.refused.values()))}")
+        reasons = dict.fromkeys(best.refused.values())
+        why = [
+            f"{', '.join(j for j, one in best.refused.items() if one == each)}: {each}" for each in reasons
+        ]
+        raise InputError(f"no joint can be judged: {'; '.join(why)}")
     answers = {joint: _answer(one) for joint, one in best.found.items()}
     told = () if records[0].sampled else tuple(told_of(best.leads))
     put_right = (one.beside(machine) for one in best.links.values())
     late = () if best.delay is None else (best.delay.told,)
-    notes = (*machine.body.notes, *said, *of_holdout, *told, *late, *put_right, *misfits(answers))
+    notes = (
+        *machine.body.notes,
+        *said,
+        *of_holdout,
+        *told,
+        *late,
+        *put_right,
+        *misfits(answers, braking(best.found, machine)),
+    )
     diagnosis = compose_machine(
         machine, best.found, answers, best.stated, best.links, best.refused, notes, best.delay
     )
@@ -163,50 +182,69 @@ class _Explained:
 
 def _explained(
     machine: Machine, balances: JointBalances, records: Sequence[JointRecord], holdout: Sequence[JointRecord],
-    catalogue: Catalogue, tell: Tell, budget: Budget,
+    catalogue: Catalogue, tell: Tell, budget: Budget, unsigned: Mapping[str, str], correction: float,
 ) -> _Explained:  # fmt: skip
-    """Search every joint, correct a link's mass or inertia where one is found, and search the joints that feel it again."""
+    """Search every joint whose effort has its sign, correct a link's mass or inertia where one is found, and search the joints that feel it again.
+
+    A correction takes about so many seconds.
+    """
     links: dict[str, WrongLink] = {}
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
     delay = reference_delay(balances, balances.computed) if balances.computed else None
-    found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget, delay)
+    joints = [joint for joint in machine.joints if joint not in unsigned]
+    found, refused = _searched(balances, unseen, joints, catalogue, tell, budget, delay, SEARCHED)
+    refused = {**unsigned, **refused}
     most = max(MOST_LINKS, len(machine.body.links))
-    while len(links) < most and len(balances.refuted) < most and not budget.spent:
+    while len(links) < most and len(balances.refuted) < most and budget.allows(correction, WEIGHED):
         best = _heaviest(found, set(links))
         if best is None:
             break
         link, result = best
         wrong = wrong_link(balances, records, found, link, result)
+        if budget.passed(WEIGHED):
+            break
         tried = wrong.put_right(machine)
-        changed = JointBalances.of(tried, records, balances)
-        owner, _ = split(link)
-        again = [joint for joint in machine.joints if feels(changed, joint, owner)]
-        unseen = JointBalances.of(tried, holdout, changed) if holdout else None
-        late = reference_delay(changed, changed.computed) if changed.computed else None
-        better, refused_now = _searched(changed, unseen, again, catalogue, tell, budget, late)
-        if weight_of_joints(found, better, again) < -decisive(1) and not budget.spent:
+        better: dict[str, JointResult] = {}
+        refused_now: dict[str, str] = {}
+        refuted = removes(machine, wrong)
+        if not refuted:
+            changed = JointBalances.of(tried, records, balances)
+            again = [joint for joint in joints if feels(changed, joint, split(link)[0])]
+            seen = JointBalances.of(tried, holdout, changed) if holdout else None
+            late = reference_delay(changed, changed.computed) if changed.computed else None
+            search = partial(
+                _searched, changed, seen, catalogue=catalogue, tell=tell, budget=budget, delay=late
+            )
+            refuted, (better, refused_now) = contradicted(found, balances, changed, again, search)
+        if refuted:
             tell(f"{link} of {result.joint} is refuted by the joints that it moves")
             balances = JointBalances.of(machine, records, balances.without(result.joint, link))
             unseen = JointBalances.of(machine, holdout, balances) if holdout else None
             better, refused_now = _searched(balances, unseen, [result.joint], catalogue, tell, budget, delay)
         else:
+            rest = [joint for joint in again if joint not in better]
+            more, refused_too = search(rest)
+            better, refused_now = {**better, **more}, {**refused_now, **refused_too}
             links[wrong.parameter] = wrong
-            machine, balances, delay = tried, changed, late
+            machine, balances, delay, unseen = tried, changed, late, seen
         found, refused = {**found, **better}, {**refused, **refused_now}
     return _Explained(machine, found, refused, links, balances.leads, delay)
 
 
 def _searched(
     balances: JointBalances, unseen: JointBalances | None, joints: Sequence[str], catalogue: Catalogue,
-    tell: Tell, budget: Budget, delay: ReferenceDelay | None,
-) -> tuple[dict[str, JointResult], dict[str, str]]:  # fmt: skip
+    tell: Tell, budget: Budget, delay: ReferenceDelay | None, end: float = EXPLAINED, waiting: int = 0,
+) -> Searched:  # fmt: skip
+    """The results of joints, and the reasons for those that cannot be judged. They share the time until this share of the budget has passed
+    with so many joints that are `waiting`: each has the same part of what those before it have left, in which it is also weighed."""
     found: dict[str, JointResult] = {}
     refused: dict[str, str] = {}
     late = 0.0 if delay is None else delay.shared.value
-    for joint in joints:
+    for place, joint in enumerate(joints):
         tell(f"joint {joint}")
+        own = budget.part(end, len(joints) + waiting - place)
         try:
-            found[joint] = diagnose_joint(balances, unseen, joint, catalogue, tell, budget, late)
+            found[joint] = diagnose_joint(balances, unseen, joint, catalogue, tell, own, late)
         except InputError as error:
             refused[joint] = str(error)
     return found, refused
@@ -263,11 +301,24 @@ def _differs(one: JointResult, label: str) -> bool:
         return True
     before, after = one.case.nominal.value(label), one.result.chosen.model.value(label)
     owner, kind = split(label)
-    if after <= 0.0 if kind == TURNING else after < LIGHTEST * before:
+    if _removed(kind, before, after):
         return False  # an effect that removes a link's mass or its whole inertia is another one
     known = one.case.nominal.parameters
     whole = known[f"{owner}.{MASS}"].value if kind == PAYLOAD and f"{owner}.{MASS}" in known else before
     return abs(after - before) > MATTERS * abs(whole)
+
+
+def _removed(kind: str, before: float, after: float) -> bool:
+    """Whether a value of a link has gone from what it is in the model."""
+    return after <= 0.0 if kind == TURNING else after < LIGHTEST * before
+
+
+def removes(machine: Machine, wrong: WrongLink) -> bool:
+    """Whether a corrected value would remove a link's mass or its whole inertia: what all joints together say may, where one joint did not."""
+    _, kind = split(wrong.parameter)
+    return kind in wrong.values and _removed(
+        kind, machine.body.parameters[wrong.parameter], wrong.values[kind].value
+    )
 
 
 def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, JointResult] | None:

@@ -2,13 +2,16 @@
 
 from collections.abc import Iterator, Mapping
 
+from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Diagnosis, FitQuality
 from rhythmid.diagnose.constants import BLIND, HOPELESS
+from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.identify.joints.effort_power import braking_note
 from rhythmid.report.quantity import NONE
 
 
-def misfits(answers: Mapping[str, Diagnosis]) -> Iterator[str]:
-    """One sentence on what to check for each joint with a poor fit.
+def misfits(answers: Mapping[str, Diagnosis], braking: Mapping[str, str]) -> Iterator[str]:
+    """One sentence on what to check for each joint with a poor fit; `braking` are those about joints whose efforts fall with the speed.
 
     There the refitted nominal model hardly predicts the effort better than no model does, and the named effects leave more of
     the effort than an identified model leaves.
@@ -17,11 +20,25 @@ def misfits(answers: Mapping[str, Diagnosis]) -> Iterator[str]:
         nominal, named = error_of(answer.fit["refitted_nominal"]), error_of(answer.fit["augmented"])
         if nominal < HOPELESS or named < BLIND:
             continue
+        if joint in braking:
+            yield braking[joint]
+            continue
         yield (
             f"{joint}: the refitted nominal model misses {100.0 * nominal:.0f} % of the effort, and {100.0 * named:.0f} % with what was fitted "
             "beside it: the body's file or the channels hardly fit; check that the file's inertias are those about the centres of mass, the "
             "order and the signs of the joints, and the units"
         )
+
+
+def braking(found: Mapping[str, JointResult], machine: Machine) -> dict[str, str]:
+    """What to check at joints whose recorded efforts fall with their speeds, by joint."""
+    told = {
+        joint: braking_note(
+            joint, one.result.search.balance, one.case.nominal, machine.body.joints[joint].rotational
+        )
+        for joint, one in found.items()
+    }
+    return {joint: note for joint, note in told.items() if note is not None}
 
 
 def left_in_words(verdict: str, share: float, significant: bool, error: float | None) -> str:

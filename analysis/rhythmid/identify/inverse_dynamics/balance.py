@@ -8,6 +8,7 @@ model itself requires. One zero-phase filter acts on the recorded effort and on 
 import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,8 +123,7 @@ class Balance:
         return made
 
     def rows(self, signals: Iterable[Array], shift: float = 0.0) -> Array:
-        """Filtered signals at the rows, `shift` [s] later. One signal (n,) or (n, p) per motion gives (rows,) or
-        (rows, p)."""
+        """Filtered signals at the rows, `shift` [s] later. One (n,) or (n, p) per motion gives (rows,) or (rows, p)."""
         return np.concatenate(
             [
                 sampled(self.filtered(one, motion.period), places, shift / motion.period)
@@ -174,6 +174,11 @@ class Balance:
     def by_reference(self) -> bool:
         """Whether the effort was not recorded but follows from a controller and its reference."""
         return self.motions[0].reference is not None
+
+    @cached_property
+    def undriven(self) -> bool:
+        """Whether no motor acts: the recorded effort is zero. An actuator makes nothing of it, so that no law of one is in the balance."""
+        return not self.by_reference and not any(motion.effort.any() for motion in self.motions)
 
     def later(self, model: Model, alignment: float = 0.0) -> float:
         """Time [s] by which the motion lags the effort, `alignment` [s] beyond the model's delays. It is 0 for an
@@ -267,7 +272,7 @@ class Balance:
             return False
         if slot == "force":
             return term.element.acts != "drive" or not self.motions[0].driven_by_base
-        if self.motions[0].driven_by_base or term.element.kernel is None:
+        if self.motions[0].driven_by_base or self.undriven or term.element.kernel is None:
             return False
         return slot == "actuator" or (
             slot == "command"

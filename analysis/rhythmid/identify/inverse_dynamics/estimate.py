@@ -84,8 +84,18 @@ class EffortFit:
 
 
 def size_of(balance: Balance) -> float:
-    """Size (rms) of the recorded effort at the rows; of a constant effort its value."""
-    return float(np.sqrt(np.mean(balance.measured**2))) or 1.0
+    """Size (rms) of the recorded effort at the rows; of a constant effort its value. Where no motor acts, it is the size of what the rest of
+    the body requires along the joint."""
+    return _size(balance.measured) or _of_coupling(balance) or 1.0
+
+
+def _size(effort: Array) -> float:
+    return float(np.sqrt(np.mean(effort**2)))
+
+
+def _of_coupling(balance: Balance) -> float:
+    coupled = [one.coupling for one in balance.motions if one.coupling is not None]
+    return _size(balance.rows(coupled)) if len(coupled) == len(balance.motions) else 0.0
 
 
 def variation_of(balance: Balance) -> float:

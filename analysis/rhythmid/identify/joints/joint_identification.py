@@ -8,7 +8,7 @@ result of inverse dynamics as prior.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,7 @@ from rhythmid.identify.joint import POOR_MOTION
 from rhythmid.identify.joints.adopted_inertia import adopted_inertia
 from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_inertia
 from rhythmid.identify.joints.correlation import Correlations
+from rhythmid.identify.joints.effort_power import braking_note
 from rhythmid.identify.joints.held_reference import balances_of, not_told
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_plausibility import check_joints
@@ -39,6 +40,7 @@ from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.same_recording import check_held_out
+from rhythmid.record.unsigned import unsigned_joints
 from rhythmid.report.quantity import in_words
 from rhythmid.result import Result, Row
 from rhythmid.statistics import NORMAL_95
@@ -54,24 +56,38 @@ LOOSE = 5.0
 RELATIVE = 0.3  # share of its value by which a parameter may move at least
 # free-run error of a correct model as a share of the motion (measured: machines in the air 1 to 3 %)
 EXPECTED = 0.02
+AT_BOUND = 1e-6  # standard deviations from a bound that rounding makes
 
 
 @dataclass(frozen=True)
 class JointEstimate:
-    """A value with its standard deviation and unit."""
+    """A value with its standard deviation and unit, and the bounds within which it was fitted."""
 
     value: float
     std: float
     unit: str
+    bounds: tuple[float, float] = (-math.inf, math.inf)
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The 95 % interval."""
-        return self.value - NORMAL_95 * self.std, self.value + NORMAL_95 * self.std
+        """The 95 % interval; it ends at a bound."""
+        low, high = self.value - NORMAL_95 * self.std, self.value + NORMAL_95 * self.std
+        return max(low, self.bounds[0]), min(high, self.bounds[1])
+
+    @property
+    def at_bound(self) -> bool:
+        """Whether the value is at a bound: the records ask for one beyond it."""
+        return any(abs(self.value - one) <= AT_BOUND * self.std for one in self.bounds)
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as plain data."""
-        return {"value": self.value, "std": self.std, "unit": self.unit, "interval": list(self.interval)}
+        return {
+            "value": self.value,
+            "std": self.std,
+            "unit": self.unit,
+            "interval": list(self.interval),
+            "at_bound": self.at_bound,
+        }
 
 
 @dataclass(frozen=True)
@@ -106,10 +122,16 @@ class MachineIdentification(Result):
         return not self.not_identified
 
     @property
+    def missed(self) -> str:
+        """What is said of joints that are not identified."""
+        of = "the effort and of the motion" if self.free_run else "the effort"
+        return f"more than {100.0 * POOR_MOTION:.0f} % of {of} is missed"
+
+    @property
     def headline(self) -> str:
         """How well the efforts are predicted."""
         if not self.usable:
-            return f"Not identified: {', '.join(self.not_identified)}: neither motion nor effort is predicted"
+            return f"Not identified: {', '.join(self.not_identified)}: {self.missed}"
         worst = max(self.effort_nrmse, key=lambda joint: self.effort_nrmse[joint])
         return f"{len(self.parameters)} parameters; efforts missed by {100.0 * self.effort_nrmse[worst]:.3g} % at most, at {worst}"
 
@@ -209,6 +231,8 @@ def identify_machine(
         correlations.append(Correlations.of_fit(joint, fit))
     tell("free runs")
     runs, notes = {}, [*machine.body.notes, *said, *of_holdout]
+    notes.extend(f"{joint}: {why}" for joint, why in unsigned_joints(records).items())
+    notes.extend(_braking(balances, fits, errors))
     if common is not None:
         notes.append(common.told)
     if better is not None:
@@ -229,6 +253,10 @@ def identify_machine(
         notes.extend(made.told("identified"))
     except InputError as error:
         notes.append(f"no free run: {error}")
+    if ends := [name for name, one in found.items() if one.at_bound]:
+        notes.append(
+            f"{', '.join(ends)}: the fit ends at the bound of the value, and so does its interval; the records ask for a value beyond it"
+        )
     told = Correlations.joined(correlations)
     worse = worse_joints(runs)
     notes.extend(_warning(joint, runs) for joint in worse)
@@ -237,6 +265,17 @@ def identify_machine(
         runs, True, worse, poor_joints(errors, runs.get("identified")), tuple(notes),
         {joint: (balance, models[joint], fit) for joint, (balance, fit) in fits.items()}, common,
     )  # fmt: skip
+
+
+def _braking(
+    balances: JointBalances, fits: Mapping[str, tuple[Balance, EffortFit]], errors: Mapping[str, float]
+) -> Iterator[str]:
+    """What to check at joints with a poor fit whose recorded efforts fall with their speeds."""
+    for joint, (balance, _) in fits.items():
+        turns = balances.machine.body.joints[joint].rotational
+        note = braking_note(joint, balance, balances.models[joint], turns)
+        if note is not None and errors[joint] > POOR_MOTION:
+            yield note
 
 
 def worse_joints(runs: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
@@ -296,13 +335,13 @@ def _with_fit(
             armature = f"{joint}.armature"
             rotor = given.body.parameters[armature] + value.value - given.paths[joint].mass.value
             machine = machine.with_inertial({armature: max(rotor, 0.0)})
-            found[f"{BODY}.{armature}"] = JointEstimate(max(rotor, 0.0), std, value.unit)
+            found[f"{BODY}.{armature}"] = JointEstimate(max(rotor, 0.0), std, value.unit, (0.0, math.inf))
         elif name.startswith(f"{BODY}."):
             machine = machine.with_inertial({name.removeprefix(f"{BODY}."): value.value})
-            found[name] = JointEstimate(value.value, std, value.unit)
+            found[name] = JointEstimate(value.value, std, value.unit, value.bounds)
         else:
             machine = machine.with_values({f"{joint}.{name}": value.value})
-            found[f"{joint}.{name}"] = JointEstimate(value.value, std, value.unit)
+            found[f"{joint}.{name}"] = JointEstimate(value.value, std, value.unit, value.bounds)
     delay = f"{joint}.input_delay.delay"
     if late is not None and delay in machine.parameters and not machine.parameters[delay].fixed:
         whole = max(machine.value(delay) + late + fit.alignment, 0.0)

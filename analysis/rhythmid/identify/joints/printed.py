@@ -18,14 +18,19 @@ def show_identification(found: "MachineIdentification", console: Console) -> Non
     if not found.usable:
         missed = ", ".join(map(escape, found.not_identified))
         console.print(
-            f"[bold]not identified: the identified values predict neither the motion nor the effort of {missed}, so none of theirs can be used[/]"
+            f"[bold]not identified: {missed}: {found.missed}, so none of their values can be used[/]"
         )
         console.print(f"  {GIVEN_VALUES}")
     rows = []
     for name, one in found.parameters.items():
         low, high = (rounded(end, one.std) for end in one.interval)
-        rows.append((name, rounded(one.value, one.std), f"{low} to {high}", one.unit))
-    title = "parameters" + ("" if found.usable else " of a fit that is not usable")
+        ends = ", ends at its bound" if one.at_bound else ""
+        rows.append((name, rounded(one.value, one.std), f"{low} to {high}{ends}", one.unit))
+    title = "parameters"
+    if set(found.not_identified) >= set(found.effort_nrmse):
+        title += " of a fit that is not usable"
+    elif found.not_identified:
+        title += f"; those of {', '.join(found.not_identified)} are not usable"
     print_table(console, title, ("name", "value", "95 % interval", "unit"), rows)
     if found.inertia is not None:
         seen = found.inertia
