@@ -17,7 +17,7 @@ class JointEffect:
     """An effect that the nominal model lacks at a joint.
 
     For a link's mass, inertia, centre of mass or payload, `link` names the link, and the joint is the one that moves it. `share` is relative to
-    the joint's mismatch. `heldout_gain` is the reduction of the joint's error on data that no fit has seen, as a share of the
+    the joint's mismatch. `together` are further links, whose masses the records do not separate from that of `link`. `heldout_gain` is the reduction of the joint's error on data that no fit has seen, as a share of the
     effort.
     """
 
@@ -30,11 +30,14 @@ class JointEffect:
     parameters: dict[str, Estimate]
     heldout_gain: float
     link: str | None = None
+    together: tuple[str, ...] = ()
 
     @property
     def of_link(self) -> str:
         """The wrong quantity of a link in words; empty where the effect acts at the joint."""
         kind = self.element.removeprefix("link_").replace("_", " ")
+        if self.link and self.together:
+            return f"{kind} of {self.link} or of the links that it carries ({', '.join(self.together)}), together"
         return f"{kind} of {self.link}" if self.link else ""
 
 

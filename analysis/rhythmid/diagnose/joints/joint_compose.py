@@ -170,7 +170,8 @@ def _link(machine: Machine, wrong: WrongLink, same: Sequence[WrongLink]) -> Join
     slot, equation, _ = EQUATIONS[element]
     return JointEffect(
         machine.body.joint_of(name), element, slot, equation, decision.shares[label],
-        decision.probability[label] / (len(same) + len(wrong.alike)), dict(wrong.values), _gain(one), name,
+        decision.probability[label] / (len(same) + len(wrong.alike)), wrong.told, _gain(one), name,
+        () if wrong.together is None else wrong.together.links,
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ With the shape of the inertia about the centre held, the force is known for any 
 (M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362), and all joints that feel the link are fitted together.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -28,6 +29,7 @@ Array = NDArray[np.float64]
 PLACES = 3  # of a centre, that are fitted: each of them has to be beaten by the odds of a candidate
 NUMBERS = 10  # of a rigid body, that are fitted
 STEP = 1e-6  # of the finite differences of a body's factor
+LARGEST = 100.0  # factor to which a link's root of mass and its sizes may differ from the file's: no body that a robot carries differs by more
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +71,12 @@ class Load:
     def moved(self) -> bool:
         """Whether the records contradict the file's centre, whatever the mass is."""
         return bool(np.any(np.abs(self.place - self.given.centre) > CONTRADICTS * self._std[1:]))
+
+    @property
+    def moment_moved(self) -> bool:
+        """Whether the records contradict the file's first moment."""
+        found, before = self.first_moment, replace(self, ten=self.given.ten).first_moment
+        return bool(abs(found.value - before.value) > CONTRADICTS * (found.std or 0.0))
 
     @property
     def better(self) -> bool:
@@ -118,7 +126,7 @@ def load_instead(
     What one joint feels of a body that is attached to a link are its first moment and its inertia about the joint, so that its mass follows
     from the joints above, whatever its inertia is.
     """
-    return _best(balances, records, found, link, corrected, _whole)
+    return _best(balances, records, found, link, corrected, fitted_body)
 
 
 Refined = Callable[[Sequence[tuple[Array, Array]], Principal, Array], tuple[Array, Array]]
@@ -176,7 +184,7 @@ def _centre(rows: Sequence[tuple[Array, Array]], own: Principal, start: Array) -
     return replace(own, centre=solved.x).ten, covariance
 
 
-def _whole(rows: Sequence[tuple[Array, Array]], own: Principal, start: Array) -> tuple[Array, Array]:
+def fitted_body(rows: Sequence[tuple[Array, Array]], own: Principal, start: Array) -> tuple[Array, Array]:
     """The ten parameters (10,) of an improved rigid body from a `start` (10,), and the covariance (4, 4) of mass and centre; `rows` as for
     `_centre`.
 
@@ -200,7 +208,11 @@ def _whole(rows: Sequence[tuple[Array, Array]], own: Principal, start: Array) ->
             ]
         )
 
-    solved = least_squares(error, first, x_scale="jac")
+    reach = np.full(NUMBERS, np.inf)
+    reach[:4] = math.log(LARGEST)
+    given = to_cholesky(own.ten)
+    inside = np.clip(first, given - 0.99 * reach, given + 0.99 * reach)
+    solved = least_squares(error, inside, bounds=(given - reach, given + reach), x_scale="jac")
     slopes = np.array([_mass_and_centre(solved.x + step) for step in STEP * np.eye(NUMBERS)])
     slopes = (slopes - _mass_and_centre(solved.x)).T / STEP
     noise = np.linalg.pinv(solved.jac.T @ solved.jac)
