@@ -98,5 +98,6 @@ def changes(columns: Array, change: float) -> tuple[Array, Array]:
 
     Each has its size as prior, so that collinear columns share the change.
     """
-    covariance = np.linalg.inv(columns.T @ columns + np.diag(sizes(columns, change) ** -2))
+    normal = columns.T @ columns + np.diag(sizes(columns, change) ** -2)
+    covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     return covariance @ (columns.T @ columns[:, 0]) * change, covariance
