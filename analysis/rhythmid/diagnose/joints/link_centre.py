@@ -162,7 +162,9 @@ def _fitted(
             for joint in joints
         ]
         ten, covariance = refined(rows, own, ten)
-        now = JointBalances.of(machine.with_load(link, ten), records, balances)
+        held = refined is _centre
+        made = machine.with_centre(link, ten[1:4] / ten[0]) if held else machine.with_load(link, ten)
+        now = JointBalances.of(made, records, balances)
     hinge = machine.body.hinges.get(link)
     origin = np.zeros(3) if hinge is None else hinge.place
     return Load(ten, covariance, own, origin, weight_of_values(found, corrected, now, joints))
