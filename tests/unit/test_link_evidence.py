@@ -65,6 +65,22 @@ def test_a_wrong_centre_of_mass_is_named_and_not_a_mass_or_a_payload(arm: Callab
     )
 
 
+def test_a_load_that_is_heavier_and_farther_out_is_told_with_its_mass_and_its_centre_and_no_gain_beside_it(
+    arm: Callable[[str], Machine],
+):
+    known = load_catalogue()
+    few = Catalogue({name: known[name] for name in ("viscous_damper", "coulomb_friction", "actuator_gain")})
+    plant = arm(FARTHER).with_inertial({"lower.mass": 3.0})
+    answer = diagnose_machine([run(plant)], arm(CENTRE), catalogue=few)
+    (one,) = answer.diagnosis.missing
+    assert (one.element, one.link, one.joint) == ("link_mass_and_centre", "lower", "two")
+    assert one.parameters["mass"].value == pytest.approx(3.0, abs=0.05)
+    assert one.parameters["z"].value == pytest.approx(-0.23, abs=0.005)
+    assert one.parameters["first_moment"].value == pytest.approx(3.0 * np.hypot(0.02, 0.23), rel=0.01)
+    assert answer.machine.body.parameters["lower.mass"] == pytest.approx(3.0, abs=0.05)
+    assert "the mass and centre of lower" in answer.diagnosis.summary
+
+
 def test_a_mass_is_found_with_its_value_though_the_joint_above_has_a_friction(arm: Callable[[str], Machine]):
     nominal = arm(CENTRE)
     heavier = nominal.with_inertial({"lower.mass": 1.4}).with_element(

@@ -15,6 +15,7 @@ from rhythmid.record.joint_record import JointRecord
 
 TIME = np.arange(0.0, 6.0, 0.002)
 SAMPLE = 0.002  # s
+FRICTION = 10.0  # N*m, as large as the efforts that move the wrist
 
 
 def asked_of(machine: Machine, hold: str = "zero", delays: dict[str, float] | None = None) -> JointRecord:
@@ -82,3 +83,12 @@ def test_a_lag_of_a_joints_command_is_named_in_the_command_path(tmp_path):
     (one,) = diagnose_machine([asked_of(plant)], machine).diagnosis.missing
     assert (one.joint, one.element, one.slot) == ("knee", "command_lag", "command")
     assert one.parameters["time_constant"].value == pytest.approx(0.03, rel=0.05)
+
+
+def test_a_friction_that_the_paths_lack_is_not_taken_for_a_late_reference():
+    plant = machine = Machine.load(MODELS / "arm.yaml")
+    dry = load_catalogue()["coulomb_friction"]
+    for joint in machine.joints:
+        plant = plant.with_element(joint, dry, {"force": FRICTION, "transition": 0.02})
+    found = found_in(machine, asked_of(plant))
+    assert max(abs(one.value) for one in found.joints.values()) < 2.0 * SAMPLE

@@ -5,6 +5,8 @@ from rhythmid.elements.element import Parameter
 
 MASS, TURNING, PAYLOAD, ARMATURE = "mass", "inertia", "payload", "armature"
 CENTRE = "centre_of_mass"  # a place (3,), no parameter of one number
+LOAD = "mass_and_centre"  # mass and centre of mass together
+MOMENT = "first_moment"  # mass times distance of the centre
 MEANING = {
     MASS: "mass of the link, shape kept",
     TURNING: "inertia of the link about the axis through its centre of mass along that of its joint, shape kept",

@@ -30,7 +30,7 @@ from pydantic import ConfigDict, StrictBool, TypeAdapter
 from pydantic import Field as Limits
 
 from rhythmid.body.body import BODY, Array
-from rhythmid.body.inertial_parameter import ARMATURE, PAYLOAD, TURNING, described, split
+from rhythmid.body.inertial_parameter import ARMATURE, MASS, PAYLOAD, TURNING, described, split
 from rhythmid.body.link_inertia import about_centre, ten_of
 from rhythmid.body.mujoco_body import HEAVIEST, MujocoBody
 from rhythmid.body.robot_file import FIXED, FREE
@@ -170,6 +170,13 @@ class Machine:
             joint: _with_inertia(path, body.effective_inertia(joint)) for joint, path in self.paths.items()
         }
         return replace(self, body=body, paths=paths)
+
+    def with_load(self, link: str, ten: Array) -> "Machine":
+        """A copy whose link, without its payload, has these ten numbers (10,), in the file's mass and inertia, too, where it lists them. Raises
+        InputError as `with_inertials` does."""
+        made = self.with_inertials({link: ten})
+        listed = [name for name in self.inertial if split(name) in ((link, MASS), (link, TURNING))]
+        return made.with_inertial({name: made.body.parameters[name] for name in listed}) if listed else made
 
     def _inertial(self, name: str, value: float) -> Value:
         parameter = described(name)

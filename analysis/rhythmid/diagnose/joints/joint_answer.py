@@ -18,7 +18,8 @@ class JointEffect:
 
     For a link's mass, inertia, centre of mass or payload, `link` names the link, and the joint is the one that moves it. `share` is relative to
     the joint's mismatch. `heldout_gain` is the reduction of the joint's error on data that no fit has seen, as a share of the
-    effort. `together` is the probability that the effect, or one of those listed in its place, is missing.
+    effort. `together` is the probability that the effect, or one of those listed in its place, is missing. `other_links` are further links, whose
+    masses the records do not separate from that of `link`.
     """
 
     joint: str
@@ -31,11 +32,14 @@ class JointEffect:
     heldout_gain: float
     link: str | None = None
     together: float = 0.0
+    other_links: tuple[str, ...] = ()
 
     @property
     def of_link(self) -> str:
         """The wrong quantity of a link in words; empty where the effect acts at the joint."""
         kind = self.element.removeprefix("link_").replace("_", " ")
+        if self.link and self.other_links:
+            return f"{kind} of {self.link} or of the links that it carries ({', '.join(self.other_links)}), together"
         return f"{kind} of {self.link}" if self.link else ""
 
 

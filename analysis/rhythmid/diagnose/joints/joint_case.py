@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from threadpoolctl import threadpool_limits
 
 from rhythmid.body.body import BODY
-from rhythmid.body.inertial_parameter import CENTRE, MASS, PAYLOAD, TURNING, split
+from rhythmid.body.inertial_parameter import CENTRE, LOAD, MASS, PAYLOAD, TURNING, split
 from rhythmid.diagnose.case import Budget, Case
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
@@ -25,7 +25,9 @@ from rhythmid.simulation.transport import INPUT_DELAY
 PROMISING = 3.0
 STIFFNESS = 0.1  # first guess of a spring: share of the effort at the size of the motion
 # the name in an answer for a wrong quantity of a link
-OF_LINKS = {MASS: "link_mass", TURNING: "link_inertia", PAYLOAD: "payload", CENTRE: "link_centre_of_mass"}
+OF_LINKS = {
+    MASS: "link_mass", TURNING: "link_inertia", PAYLOAD: "payload", CENTRE: "link_centre_of_mass", LOAD: "link_mass_and_centre"
+}  # fmt: skip
 GAINS = (0.9, 1.1)  # first guesses of an actuator's gain
 # first guesses of a limit of the reference's rate, in standard deviations of the joint's speed: if the limit acts most of the time,
 # the reference and the joint move at that rate

@@ -13,7 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rhythmid.body.body import BODY
-from rhythmid.body.inertial_parameter import MASS, PAYLOAD, TURNING, split
+from rhythmid.body.inertial_parameter import LOAD, MASS, PAYLOAD, TURNING, split
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
@@ -327,7 +327,8 @@ def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, J
     for one in found.values():
         for label in stated_at(one):
             link = label.removeprefix(f"{BODY}.")
-            if not label.startswith(f"{BODY}.") or link in known:
+            whole = f"{split(link)[0]}.{LOAD}"  # all its parameters were fitted
+            if not label.startswith(f"{BODY}.") or link in known or whole in known:
                 continue
             contest = one.result.contest
             gain = one.result.selection.chosen.prediction.score - contest.nominal.prediction.score

@@ -276,6 +276,7 @@ def _same_places(one: Machine, other: Machine) -> bool:
     places = (
         (one.body.ends, other.body.ends),
         (one.body.centres, other.body.centres),
+        (one.body.replaced, other.body.replaced),
     )
     return all(
         first.keys() == second.keys() and all(np.array_equal(first[link], second[link]) for link in first)

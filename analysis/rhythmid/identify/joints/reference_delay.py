@@ -5,8 +5,9 @@ usually arrive in one message, so all have one delay. The delay with which most 
 whether all joints agree.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +21,7 @@ from rhythmid.identify.inverse_dynamics.estimate import FARTHEST, Alignment, Eff
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.least_squares import orthonormal
 from rhythmid.identify.student import weights_of
+from rhythmid.model import Model
 from rhythmid.statistics import NORMAL_95
 
 Array = NDArray[np.float64]
@@ -104,9 +106,24 @@ def reference_delay(balances: JointBalances, joints: Sequence[str]) -> Reference
 
 
 def delay_fit(balance: Balance, balances: JointBalances, joint: str) -> EffortFit:
-    """The fit of a joint's path with the delay of its reference free, started at the best point of a scan."""
+    """The fit of a joint's path with the delay of its reference free, started without delay and at the best point of a scan.
+
+    A longer delay makes the computed effort itself smaller, and with it everything that the path lacks. So a delay has to be worth its prior
+    of a sample, and what is left, which lasts for many rows, counts as often as it is independent.
+    """
     model = balances.models[joint]
-    wide = Alignment(LONGEST_REFERENCE_DELAY, -FARTHEST * balance.period, LONGEST_REFERENCE_DELAY)
+    flat = Alignment(LONGEST_REFERENCE_DELAY, -FARTHEST * balance.period, LONGEST_REFERENCE_DELAY)
+    start = _scanned(balance, model, flat)
+    free = fit_effort(balance, model, aligned=flat, alignment=start)
+    usual = Alignment.of(balance)
+    known = replace(flat, std=usual.std / math.sqrt(free.correlation))
+    fits = [fit_effort(balance, model, aligned=known, alignment=at) for at in (free.alignment, 0.0)]
+    best = min(fits, key=lambda fit: fit.cost)
+    return replace(best, std=np.append(best.std[0] * math.sqrt(free.correlation), best.std[1:]))
+
+
+def _scanned(balance: Balance, model: Model, wide: Alignment) -> float:
+    """The delay [s] within these limits with the least error of the path fitted without one. Raises InputError where nothing can be fitted."""
     first = fit_effort(balance, model, steps=FIRST)
     weight = weights_of(first.residual, first.scale) / first.scale**2
     root = np.sqrt(weight)
@@ -120,7 +137,7 @@ def delay_fit(balance: Balance, balances: JointBalances, joint: str) -> EffortFi
         costs.append(float(error @ error))
     if not np.isfinite(costs).all():
         raise InputError("the joints cannot be fitted: their motion holds too little")
-    return fit_effort(balance, model, aligned=wide, alignment=float(tried[int(np.argmin(costs))]))
+    return float(tried[int(np.argmin(costs))])
 
 
 def shared(joints: dict[str, Delay], period: float) -> ReferenceDelay:
