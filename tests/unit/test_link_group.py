@@ -65,5 +65,7 @@ def test_collinear_masses_share_a_change_and_the_interval_of_their_sum_is_narrow
 
 
 def test_a_group_of_links_is_named():
-    one = JointEffect("one", "link_mass", "body", "m → m′", 0.9, 0.9, {}, 0.2, "upper", other_links=("lower",))
+    one = JointEffect(
+        "one", "link_mass", "body", "m → m′", 0.9, 0.9, {}, 0.2, "upper", other_links=("lower",)
+    )
     assert one.of_link == "mass of upper or of the links that it carries (lower), together"
