@@ -152,6 +152,19 @@ def test_the_command_watches_until_it_is_interrupted(graph, tmp_path):
     assert "twin" in said  # the board, or that it has been waited for
 
 
+def test_a_watch_that_fails_writes_no_result(graph, tmp_path, monkeypatch):
+    (tmp_path / "lift.yaml").write_text(LIFT)
+    node = graph.add(TwinNode, model=str(tmp_path / "lift.yaml"), result=str(tmp_path / "watch.json"))
+
+    def refused():
+        raise InputError("most measurements came too late")
+
+    monkeypatch.setattr(node._watch, "advance", refused)
+    graph.until(lambda: node.failure is not None, "the failure")
+    node.close()
+    assert not (tmp_path / "watch.json").exists()
+
+
 def test_what_the_node_refuses_the_command_says_in_one_line(domain, rhythmid):
     done = rhythmid("watch", "absent.yaml")
     assert (

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import rhythmid as package
+from rhythmid.design.requirements import Requirements
 from rhythmid.experiment import Experiment
 from rhythmid.offline_run import perform
 from rhythmid.report.terminal_table import estimate_cells
+from rhythmid.settings import Forcing
 
 PAPER = Path(package.__file__).parent / "models" / "paper_hopper.yaml"
 ARGUMENTS = ("--duration", 40, "--band", 0, 6, "--max-effort", 0.02, "--envelope", 0.13, 0.17, "--noise-std", 2e-5,
@@ -74,6 +76,16 @@ def test_every_free_parameter_and_both_delays_have_a_predicted_standard_deviatio
         assert estimate_cells(estimate["value"], estimate["std"])[1] in said, name
     assert result["amplitude"]["crest_factor"] < 1.8
     assert result["distortion"]["even"] > result["distortion"]["odd"] > 0.0
+
+
+def test_a_forcing_that_nobody_has_stated_is_said_to_be_assumed_and_part_of_the_plan(made):
+    plan, said = made
+    assert "forcing of 1 N at 1 Hz, part of the plan" in said and "the model has no forcing" in said
+    assert json.loads((plan / "design.json").read_text())["forcing"]["assumed"]
+    machine = package.Model.load(PAPER)
+    limits = (40.0, (0.0, 6.0), 0.02, (0.13, 0.17), 2e-5)
+    assert Requirements.of(machine, *limits).forcing_assumed
+    assert not Requirements.of(machine, *limits, forcing=Forcing(1.0, 1.0)).forcing_assumed
 
 
 def test_the_example_in_the_documents_gives_what_they_show(command, tmp_path):

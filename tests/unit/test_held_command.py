@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from foreign import array, joint_state, moved, write
 
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.read import read_record
+from rhythmid.record.timing import Timing
 from rhythmid.start.start import guess
 
 TIME = 0.002 * np.arange(6000)
@@ -65,3 +67,29 @@ def test_init_writes_the_hold_with_its_reason(tmp_path):
     text = guess(written(tmp_path, EVENTS)).signals
     (line,) = [line for line in text.splitlines() if line.startswith("input:")]
     assert "hold: zero" in line and "change in steps and are far sparser" in " ".join(text.split())
+
+
+def test_an_effort_whose_messages_have_no_stamps_is_held_in_a_bag(tmp_path):
+    time, force = 0.01 * np.arange(2000), np.repeat(np.random.default_rng(2).standard_normal(1000), 2)
+    states = [
+        (t, joint_state(t, ["slide"], position=[x])) for t, x in zip(time, moved(force, 1.0, 2.0, 30.0)[0])
+    ]
+    at = (time < 12.0) | (time > 14.0)  # the program has ended with zero, and its guard sends zeros later
+    sent = [(t + 1e-4, array([u * (t < 11.9)])) for t, u in zip(time[at], force[at])]
+    bag = write(tmp_path / "bag", {"/axes": states, "/forces": sent})
+    text = guess(bag).signals
+    assert "hold: linear}" not in text and "messages have no stamps, as those of commands" in " ".join(
+        text.split()
+    )
+    (tmp_path / "signals.yaml").write_text(text)
+    report = quality_report(bag, tmp_path / "signals.yaml")
+    assert (report.channels["input"].timing.gaps, report.channels["input"].timing.lost) == (0, 0)
+    assert report.cut is not None and not report.cut.gaps
+
+
+def test_a_held_command_that_differs_after_a_gap_is_missing():
+    time = np.delete(0.01 * np.arange(1000), [*range(300, 320), *range(600, 605)])
+    value = np.where(time < 4.0, 1.0, np.where(time < 6.02, 2.0, 3.0))
+    every, held = Timing.of(time), Timing.of(time).of_held(time, value)
+    assert (every.gaps, every.lost) == (2, 25)
+    assert (held.gaps, held.lost) == (1, 5) and held.longest_gap == pytest.approx(0.06)

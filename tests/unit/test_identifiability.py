@@ -1,5 +1,6 @@
 """What cannot be known is said: sums instead of splits, intervals, aliases, directions in words, closure."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -15,10 +16,11 @@ from rhythmid.identify.joint import JointFit, joint_likelihood
 from rhythmid.identify.natural_size import natural_size
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import prepare
-from rhythmid.identify.undetermined import undetermined
+from rhythmid.identify.undetermined import possible_step, undetermined
 from rhythmid.model import Model
 from rhythmid.offline_run import simulate
 from rhythmid.record.record import Record
+from rhythmid.value import Value
 
 SPEC = {"type": "chirp", "amplitude": 0.05, "band": [0, 7], "sweep": 12.0}
 DELAYS = (0.04, 0.055)
@@ -132,7 +134,8 @@ def test_parameters_that_act_alike_are_named(joint, searched, with_free_gravity,
     fit = searched if search else estimate(with_free_gravity, prepare(joint.records), iterations=6)
     words = [d.words for d in undetermined(fit)]
     assert len(words) == 1
-    assert "gravity.acceleration" in words[0] and "linear_spring.rest_length" in words[0]
+    assert re.search(r"gravity.acceleration by [-+][\d.e-]+ m/s\^2", words[0])
+    assert re.search(r"linear_spring.rest_length by [-+][\d.e-]+ m\b", words[0])
     assert fit.std["gravity.acceleration"] > 1e3 and fit.std["linear_spring.rest_length"] > 1e3
 
 
@@ -204,6 +207,21 @@ def test_parameters_whose_effect_drowns_in_the_noise_are_told():
 def test_a_parameter_is_measured_by_what_it_would_have_to_be_to_matter(scales, unit, size):
     known = replace(scales, effort=1.5, position=0.02, mass=2.0, frequency=10.0 / (2.0 * np.pi))
     assert natural_size(unit, known) == (size if size is None else pytest.approx(size))
+
+
+@pytest.mark.parametrize(
+    ("delay", "bounds", "expected"),
+    [
+        (0.03, (0.0, 0.3), [5e-7, -0.01]),  # a tenth of the size of a time
+        (0.002, (0.0, 0.3), [-5e-7, 0.01]),  # there is no room below
+        (0.002, (0.0, 0.004), [1e-7, -0.002]),
+        (0.0, (0.0, 0.0), [5e-7, -0.01]),
+    ],
+)
+def test_parameters_that_change_together_change_by_what_is_possible(delay, bounds, expected):
+    known = [Value(1.2, "kg", bounds=(0.0, np.inf)), Value(delay, "s", bounds=bounds)]
+    found = possible_step(known, np.array([1.0, -2e4]), np.array([1.2, 0.1]))
+    np.testing.assert_allclose(found, expected)
 
 
 def test_what_a_design_leaves_in_doubt_is_no_rest_length_of_zero(about_zero):

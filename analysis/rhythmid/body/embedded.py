@@ -12,7 +12,10 @@ from rhythmid.errors import InputError
 from rhythmid.model import Model
 
 NAME = "rhythmid"  # name of the text in the file
-ABSENT = "the model holds no paths of joints: write its file with  rhythmid export MACHINE.yaml --to mujoco --out FILE.xml"
+ABSENT = (
+    "the model holds no paths of joints: apply needs a file that  rhythmid export MACHINE.yaml --to mujoco --out FILE.xml  wrote of a machine "
+    "with `joints:`; that of a one-axis model runs without apply, and its comments tell what MJCF cannot express"
+)
 
 
 def text_of(paths: Mapping[str, Model]) -> str:

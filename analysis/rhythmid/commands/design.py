@@ -64,7 +64,7 @@ def design(
         tuple[float, float] | None,
         typer.Option(
             "--forcing",
-            help="Amplitude in N and frequency in Hz of the forcing on the robot; by default the model's, else 1 1.",
+            help="Amplitude in N and frequency in Hz of the forcing on the robot; by default the model's, else 1 1, with a note.",
         ),
     ] = None,
     delays: Annotated[

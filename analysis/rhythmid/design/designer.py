@@ -87,6 +87,13 @@ class Design(Result):
     def notes(self) -> tuple[str, ...]:
         """Notes for the user, one line each."""
         found = []
+        if self.requirements.forcing_assumed:
+            forcing = self.requirements.forcing
+            found.append(
+                f"the model has no forcing: one of {forcing.amplitude:g} {self.experiment.model.units.force} at {forcing.frequency:g} Hz is "
+                "assumed and part of the plan. The prediction, that of the two delays above all, holds only if it acts during the run; "
+                "state it with --forcing"
+            )
         if self.distortion.total > STRONG:
             found.append(
                 f"the response departs from a linear one by {self.distortion.total:.1%}: transfer functions are distorted; "
@@ -169,6 +176,12 @@ class Design(Result):
                 "window": self.plan.window,
                 "harmonics": lines.harmonics,
                 "frequencies": lines.frequency.tolist(),
+            },
+            "forcing": {
+                "amplitude": self.requirements.forcing.amplitude,
+                "frequency": self.requirements.forcing.frequency,
+                "phase": self.requirements.forcing.phase,
+                "assumed": self.requirements.forcing_assumed,
             },
             "parameters": {name: e.to_dict() for name, e in self.prediction.parameters.items()},
             "delays": {name: e.to_dict() for name, e in self.prediction.delays.items()},

@@ -17,6 +17,11 @@ def show(result: Mapping[str, Any], console: Console) -> None:
         f"{result['kind']}: {len(signal['frequencies'])} lines, peak {size['peak']:.4g} {size['unit']} "
         f"(limit: {size['limited_by']}), rms {size['rms']:.4g}, crest factor {size['crest_factor']:.2f}"
     )
+    forcing = result["forcing"]
+    console.print(
+        f"forcing of {forcing['amplitude']:g} {size['unit']} at {forcing['frequency']:g} Hz, part of the plan: the machine moves in "
+        "the limit cycle that it causes"
+    )
     low, high = position["cycle"]
     console.print(
         f"position {position['low']:.6g} to {position['high']:.6g} {position['unit']}, the limit cycle alone {low:.6g} to "

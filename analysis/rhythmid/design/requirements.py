@@ -49,6 +49,8 @@ class Requirements:
         Period [s] and spacing of the lines [Hz] of a multisine; chosen where None.
     seed
         Seed of the random phases.
+    forcing_assumed
+        Whether neither the model nor the user states the forcing.
 
     Raises
     ------
@@ -73,6 +75,7 @@ class Requirements:
     period: float | None = None
     spacing: float | None = None
     seed: int = 0
+    forcing_assumed: bool = False
 
     @classmethod
     def of(
@@ -102,7 +105,8 @@ class Requirements:
         late = transport_delays(model) if delays is None else delays
         return cls(
             duration, band, max_effort, envelope, noise_std, input_delay=late[0], measurement_delay=late[1],
-            forcing=forcing_of(model) if forcing is None else forcing, **further,
+            forcing=forcing_of(model) if forcing is None else forcing,
+            forcing_assumed=forcing is None and model.term("periodic_forcing") is None, **further,
         )  # fmt: skip
 
     def __post_init__(self) -> None:

@@ -11,8 +11,10 @@ from rhythmid.identify.harmonic_likelihood import INPUT_DELAY, MEASUREMENT_DELAY
 from rhythmid.identify.identification import Estimate
 from rhythmid.identify.natural_size import sizes_of
 from rhythmid.identify.output_error import Fit
+from rhythmid.value import Value
 
 Array = NDArray[np.float64]
+EXAMPLE = 0.1  # largest change of a parameter in a message, as a share of its size: small enough for a linear change
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,13 @@ def undetermined(fit: Fit) -> list[Direction]:
     values, vectors = np.linalg.eigh(information)
     floor = max(1.0, 1e-11 * float(values[-1]))  # below this the error of the finite differences dominates
     felt = np.linalg.norm(fit.linearisation.jacobian, axis=0)
-    return [_direction(fit.names, vectors[:, i], size, felt) for i in range(p) if values[i] < floor]
+    known = [parameters[name] for name in fit.names]
+    return [_direction(fit.names, known, vectors[:, i], size, felt) for i in range(p) if values[i] < floor]
 
 
-def _direction(names: Sequence[str], vector: Array, size: Array, felt: Array) -> Direction:
+def _direction(
+    names: Sequence[str], known: Sequence[Value], vector: Array, size: Array, felt: Array
+) -> Direction:
     """The direction in words, with the parameters that take part, measured by their sizes or by the effect per unit
     in `felt`. The second is needed because the value of an undetermined parameter is arbitrary."""
     share, part = np.abs(vector) / np.abs(vector).max(), np.abs(vector * size * felt)
@@ -57,9 +62,34 @@ def _direction(names: Sequence[str], vector: Array, size: Array, felt: Array) ->
     elif set(moved) == {INPUT_DELAY, MEASUREMENT_DELAY} and abs(step.sum()) < 0.05 * np.abs(step).max():
         words = "only the sum of the input delay and the measurement delay is identifiable"
     else:
-        change = ", ".join(f"{name} by {s / step[0]:+.3g}" for name, s in zip(moved, step))
-        words = f"these can change together without any effect on the records: {change}"
+        taking = [known[int(i)] for i in large]
+        told = [
+            f"{name} by {change:+.3g} {one.unit}".removesuffix(" 1")
+            for name, one, change in zip(moved, taking, possible_step(taking, step, size[large]))
+        ]
+        words = f"these can change together without any effect on the records: {', '.join(told)}"
     return Direction(tuple(moved), vector[large], words)
+
+
+def possible_step(known: Sequence[Value], step: Array, size: Array) -> Array:
+    """A multiple of `step` (n,) that changes no parameter by more than `EXAMPLE` of its `size` (n,) and keeps all
+    within their bounds; the first one increases if the bounds leave as much room for that as for the opposite.
+
+    Bounds that leave no room at all are ignored: a value on its bound says that the optimum lies beyond.
+    """
+    example = step * (EXAMPLE / np.max(np.abs(step / size)))
+    value = np.array([one.value for one in known])
+    low, high = np.array([one.bounds for one in known]).T
+    first = 1.0 if example[0] >= 0.0 else -1.0
+    found = []
+    for sign in (first, -first):
+        change = sign * example
+        bound = np.where(change > 0.0, high, low)
+        moving = change != 0.0
+        share = np.min((bound - value)[moving] / change[moving], initial=1.0)
+        found.append((max(float(share), 0.0), change))
+    share, change = max(found, key=lambda one: one[0])  # the first of equal ones
+    return change * (share or 1.0)
 
 
 def sum_of(fit: Fit, *names: str) -> Estimate:

@@ -5,10 +5,12 @@ them. The samples show whether they resolve it: then a line through a sample's n
 sample before.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.record.record import Channel
+from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
 # ratio of the input's interval to the output's above which the input is far sparser. Loggers sample measured
@@ -35,6 +37,30 @@ def held_note(given: Channel, answer: Channel) -> str | None:
         f"its {len(given)} samples, usually {usual:.3g} s apart, change in steps and are far sparser than the output's: each is taken as "
         "held until the next one (hold: zero); where it was measured, say  hold: linear"
     )
+
+
+def with_hold(record: Record) -> Record:
+    """A table's record with the hold of its input: steps for events; else band-limited where evenly spaced
+    apart from gaps, linear otherwise."""
+    if record.input is None:
+        return record
+    if note := held_note(record.input, record.output):
+        quality = replace(record.quality, notes=(*record.quality.notes, f"input: {note}"))
+        return replace(record, hold="zero", quality=quality)
+    step = np.diff(record.input.time)
+    periods = np.rint(step / record.input.period)  # more than one where samples are missing
+    even = len(step) > 2 and np.abs(step - periods * record.input.period).max() < 2e-9 and periods.min() > 0.0
+    return replace(record, hold="band_limited" if even else "linear")
+
+
+def with_held_commands(record: Record) -> Record:
+    """The record with the timing of its input as that of a held command, where it is held."""
+    if record.input is None or record.hold != "zero":
+        return record
+    known, given = record.quality.channels, record.input
+    timing = known["input"].timing.of_held(given.time, given.value)
+    channels = {**known, "input": replace(known["input"], timing=timing)}
+    return replace(record, quality=replace(record.quality, channels=channels))
 
 
 def _is_resolved(time: Array, value: Array) -> bool:

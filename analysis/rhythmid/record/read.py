@@ -18,7 +18,7 @@ from rhythmid.record.channel_quality import channel_quality
 from rhythmid.record.clocks import assumed_clock, clock_notes
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.foreign_file import refuse_foreign
-from rhythmid.record.held_command import held_note
+from rhythmid.record.held_command import with_held_commands, with_hold
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
@@ -182,7 +182,7 @@ def read_tables(signals: Signals) -> Record:
     if first >= CALENDAR:  # the used part starts with its first row
         made = {role: replace(samples, time=samples.time - first) for role, samples in made.items()}
     record = _record(name, made, signals, SPLIT, quality)
-    record = replace(record, hold=signals.hold) if signals.hold else _with_hold(record)
+    record = replace(record, hold=signals.hold) if signals.hold else with_hold(record)
     record = _finish(replace(record, one_clock=len(clocks) == 1), signals)
     return record if first >= CALENDAR else counted_from(record, origin_of(first))
 
@@ -322,7 +322,9 @@ def _conflicts(samples: Samples, time: NDArray[np.float64], value: NDArray[np.fl
 
 
 def _finish(record: Record, signals: Signals) -> Record:
-    """Cut to the used part, reject unusable data, and add a forcing that is given by a formula."""
+    """Count held commands as known, cut to the used part, reject unusable data, and add a forcing that is given by a
+    formula."""
+    record = with_held_commands(record)
     if signals.use != (-np.inf, np.inf):
         record = record.cut(*signals.use)
     for role, channel in record.channels.items():
@@ -384,17 +386,3 @@ def _pumping_frequency(record: Record) -> float:
         except (KeyError, TypeError, ValueError, AttributeError):
             return 0.0
     return law.frequency if law is not None and law.amplitude != 0.0 else 0.0
-
-
-def _with_hold(record: Record) -> Record:
-    """A table's record with the hold of its input: steps for events; else band-limited where evenly spaced
-    apart from gaps, linear otherwise."""
-    if record.input is None:
-        return record
-    if note := held_note(record.input, record.output):
-        quality = replace(record.quality, notes=(*record.quality.notes, f"input: {note}"))
-        return replace(record, hold="zero", quality=quality)
-    step = np.diff(record.input.time)
-    periods = np.rint(step / record.input.period)  # more than one where samples are missing
-    even = len(step) > 2 and np.abs(step - periods * record.input.period).max() < 2e-9 and periods.min() > 0.0
-    return replace(record, hold="band_limited" if even else "linear")

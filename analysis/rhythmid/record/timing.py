@@ -1,7 +1,7 @@
 """Timing of samples: order, duplicates, nominal period, gaps, jitter."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +95,23 @@ class Timing:
             len(first), lost, float(step[first].max(initial=0.0)), duplicates, late,
             None if pause is None else usual_range(step),
         )  # fmt: skip
+
+    def of_held(self, time: Times, value: Times) -> "Timing":
+        """The timing of a held command with increasing times (n,) and values (n,): one that has the same value after a
+        gap as before it acted all along, and is not missing."""
+        if self.gaps == 0 or len(time) < 2:
+            return self
+        step = np.diff(time)
+        first, missing = _gaps(time, *_sampling(step))
+        changed = value[first] != value[first + 1]
+        longest = float(step[first[changed]].max(initial=0.0))
+        gaps, lost = int(np.count_nonzero(changed)), int(missing[changed].sum())
+        return replace(
+            self,
+            gaps=min(self.gaps, gaps),
+            lost=min(self.lost, lost),
+            longest_gap=min(self.longest_gap, longest),
+        )
 
 
 def gaps_between(time: Times) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -16,7 +16,7 @@ from rhythmid.record.held_command import held_note
 from rhythmid.record.inventory import Inventory, Recorded, header_clock
 from rhythmid.record.record import Channel
 from rhythmid.record.signals import ROLES, Clock
-from rhythmid.start.meaning import driving_unit_of, meaning_of, tells_unit
+from rhythmid.start.meaning import driving_unit_of, is_measured_effort, meaning_of, tells_unit
 from rhythmid.start.nominal import Nominal
 from rhythmid.start.role_choice import Choice
 from rhythmid.start.roles import Roles
@@ -184,6 +184,7 @@ def _channel(role: str, one: Recorded, roles: Roles, units: Units, bag: bool) ->
         held = (
             roles.input_kind == "reference"
             or meaning_of(one).commanded is True
+            or _is_like_a_command(one, roles)
             or bool(_held_note(one, roles))
         )
         if not bag and held:
@@ -193,6 +194,14 @@ def _channel(role: str, one: Recorded, roles: Roles, units: Units, bag: bool) ->
     return f"{{{', '.join(parts)}}}"
 
 
+def _is_like_a_command(one: Recorded, roles: Roles) -> bool:
+    """Whether an effort of a bag of which no name says who set it has messages without stamps: the types of
+    sensors (`sensor_msgs`) have stamps, and those in which controllers receive commands have none
+    (`std_msgs/Float64MultiArray` of ros2_controllers)."""
+    unsaid = meaning_of(one).commanded is None and not is_measured_effort(one)
+    return bool(one.topic) and roles.input_kind == "force" and not one.stamped and unsaid
+
+
 def _held_note(one: Recorded, roles: Roles) -> str | None:
     """Note on an input whose samples show a hold."""
     there = [(each, np.isfinite(each.value)) for each in (one, roles.choices["output"].recorded)]
@@ -200,8 +209,13 @@ def _held_note(one: Recorded, roles: Roles) -> str | None:
 
 
 def _held_comment(one: Recorded, roles: Roles) -> list[str]:
-    """A comment where the samples of the driving signal show a hold that no name states."""
+    """A comment where the samples or messages of the driving signal show a hold that no name states."""
     note = None if meaning_of(one).commanded or roles.input_kind == "reference" else _held_note(one, roles)
+    if note is None and _is_like_a_command(one, roles):
+        note = (
+            "its messages have no stamps, as those of commands, so each is taken as held until the next one (hold: zero); "
+            "where it was measured, say  hold: linear"
+        )
     return comment(f"  CHECK: {note}.") if note else []
 
 

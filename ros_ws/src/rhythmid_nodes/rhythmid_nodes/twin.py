@@ -177,7 +177,8 @@ class TwinNode(GraphNode):
         calibration = self._watch.twin.calibration
         if self.values["save_calibration"] and calibration is not None:
             save(calibration, Path(self.values["save_calibration"]))
-        if self.values["result"]:
+        # a failed watch writes none: its events so far would read as all that there was to see
+        if self.values["result"] and self.failure is None:
             write_json(
                 Path(self.values["result"]),
                 {"events": [event.to_dict() for event in self._watch.events.found]},
