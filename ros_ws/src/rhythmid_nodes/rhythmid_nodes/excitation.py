@@ -33,6 +33,7 @@ from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, Gra
 from .node_state import NodeState
 from .parameters import Parameter
 from .qos import latched, stream
+from .receivers import Receivers
 from .watch import Watch
 from .watch_parameters import PARAMETERS as WATCHED
 from .watch_parameters import limits
@@ -86,6 +87,7 @@ class ExcitationNode(GraphNode):
         self._lock = threading.Lock()  # measurements and services come on another thread than ticks
         self._output: Any = self._commander()
         self._authority = Authority(self, self._output.publisher.topic, self._on_intrusion)
+        self._receivers = Receivers(self, self._output.publisher)
         self._run = self.create_publisher(String, "run", latched())
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/stop", self._on_stop)
@@ -169,7 +171,8 @@ class ExcitationNode(GraphNode):
         }
 
     def obstacles(self) -> list[str]:
-        found = [self._unheard(), self._authority.conflict(), self._unrecorded()]
+        received = self._receivers.missing() if self.values["subscribers"] else ""
+        found = [self._unheard() or received, self._authority.conflict(), self._unrecorded()]
         if not self.lockstep:
             found.append(self._watch.danger(self._wall.now()))
         return [obstacle for obstacle in found if obstacle]
