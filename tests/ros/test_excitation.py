@@ -14,6 +14,7 @@ from std_msgs.msg import Float64, Float64MultiArray, String
 from rhythmid.errors import InputError
 from rhythmid.excitation.sequence import build
 from rhythmid.experiment import Safety, ramped
+from rhythmid_nodes import waiting
 from rhythmid_nodes.excitation import ExcitationNode
 from rhythmid_nodes.qos import latched
 
@@ -91,14 +92,29 @@ def test_it_plays_the_experiments_samples_on_a_grid_without_gaps(graph, excite):
     assert heard[-1].effort[0] == 0.0
 
 
-def test_it_does_not_start_before_there_is_a_measurement(graph):
-    graph.add(ExcitationNode, max_effort=1.0, excitation=json.dumps(CONSTANT))
+def test_it_does_not_start_before_there_is_a_measurement_and_says_where_it_looks(graph, monkeypatch, capfd):
+    monkeypatch.delenv("RHYTHMID_SUPERVISOR")  # who would say it
+    monkeypatch.setattr(waiting, "FIRST", 0.1)
+    said = "no measurement of joint leg on /arm/axes yet"
+    graph.add(
+        ExcitationNode, {"joint_states": "/arm/axes"}, max_effort=1.0, excitation=json.dumps(CONSTANT),
+        unattended=True,
+    )  # fmt: skip
     heard = graph.listen("excitation")
     graph.until(lambda: graph.nodes[0]._output.publisher.get_subscription_count() == 1, "a subscriber")
     answer = graph.call("excitation/start")
-    assert not answer.success and answer.message == "no measurement on joint_states yet"
+    assert not answer.success and answer.message == f"/hopper/recorder is not active; {said}"
     graph.spin(0.1)
     assert not heard
+    log = ""
+
+    def told():
+        nonlocal log
+        log += "".join(capfd.readouterr())
+        return "waiting: " in log
+
+    graph.until(told, "what it waits for")
+    assert said in log and "/hopper/recorder is not active" in log
 
 
 def test_it_does_not_start_before_everybody_listens(graph, excite):

@@ -62,7 +62,9 @@ class CommandGuard(GraphNode):
         if self.lockstep:
             raise InputError("parameter time_mode = 'lockstep': a robot has no simulated time")
         self._limits = EffortLimits(values["max_effort"], values["max_effort_rate"], values["max_power"])
-        self._watch = Watch(limits(values))
+        self._watch = Watch(
+            limits(values), f"joint {values['joint']} on {self.resolve_topic_name('joint_states')}"
+        )
         self._hold = self._new_hold()
         self._reader = JointStateReader(values["joint"])
         self._wall = Clock()

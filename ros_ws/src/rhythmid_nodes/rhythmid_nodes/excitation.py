@@ -127,7 +127,9 @@ class ExcitationNode(GraphNode):
     def _judge(self) -> Any:
         """Reads and judges measurements."""
         self._reader: Any = JointStateReader(self.values["joint"])
-        return Watch(limits(self.values))
+        return Watch(
+            limits(self.values), f"joint {self.values['joint']} on {self.resolve_topic_name('joint_states')}"
+        )
 
     def _command(self) -> NDArray[np.float64]:
         """u(t) [N] on the grid, faded and clamped: the same numbers as in a run without ROS."""
@@ -184,8 +186,10 @@ class ExcitationNode(GraphNode):
 
     def _unrecorded(self) -> str:
         """Message that the recorder is not active, for an unattended run; else empty."""
-        waits = self._recorder is not None and self._state == "idle" and not self._recorder.active
-        return f"{self.values['recorder']} is not active" if waits else ""
+        recorder = self._recorder
+        if recorder is None or self._state != "idle" or recorder.active:
+            return ""
+        return f"{recorder.name} is not active"
 
     def _other_graphs(self) -> list[str]:
         """Namespaces of the other excitations in this DDS domain; each is reported once."""
