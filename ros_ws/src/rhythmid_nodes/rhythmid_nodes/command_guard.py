@@ -154,7 +154,7 @@ class CommandGuard(GraphNode):
             return
         now = self._wall.now()
         self._watch.hear(sample, now)
-        if self._engaged(now) and (danger := self._watch.danger(now)):
+        if not self.tripped and self._engaged(now) and (danger := self._watch.danger(now)):
             self._stop(danger)
 
     def _engaged(self, now_ns: int) -> bool:
@@ -177,7 +177,7 @@ class CommandGuard(GraphNode):
             self._give(stamp_ns, wanted)
         if self._hold.lapses:
             self.notice(lapse_notice(self.values["command_timeout"]))
-        if danger and engaged:
+        if danger and engaged and not self.tripped:
             self._stop(danger)
 
     def _give(self, stamp_ns: int, wanted: float) -> None:

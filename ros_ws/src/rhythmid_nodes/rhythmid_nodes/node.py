@@ -113,7 +113,9 @@ class GraphNode(ManagedNode):
             self.get_logger().warning(f"waiting: {'; '.join(obstacles)}")
 
     def trip(self, reason: str) -> None:
-        """Stop permanently because of `reason`: report it, and end the process soon. The last reported reason counts."""
+        """Stop permanently because of `reason`: report it, and end the process soon. The first reason counts, until an unnamed node gets its name."""
+        if self.tripped and UNNAMED not in self.tripped:
+            return
         self.tripped = reason
         self.get_logger().error(f"stopped: {reason}")
         if UNNAMED in reason:
