@@ -1,6 +1,7 @@
 """Excitation over real topics: plays what the experiment says, and stops by itself when the machine is not safe."""
 
 import json
+import re
 import time
 
 import numpy as np
@@ -246,12 +247,15 @@ def test_the_effort_is_clamped(graph, excite):
     assert {message.effort[0] for message in heard} == {0.2}
 
 
-def test_a_node_that_is_ended_leaves_a_zero_behind(graph, excite):
+def test_a_node_that_is_ended_leaves_a_zero_behind_and_reports_no_error(graph, excite, capfd):
     node, heard, run, _ = excite()
     start(graph)
     graph.until(lambda: len(heard) > 50, "samples")
     graph.nodes.remove(node)
     node.close()
+    log = "".join(capfd.readouterr())
+    assert re.search(r"\[INFO\].* the node was ended .*; the effort is zero at once", log), log
+    assert "[ERROR]" not in log
     graph.until(lambda: heard[-1].effort[0] == 0.0, "the last command")
     graph.until(lambda: "ended" in last_state(run).get("reason", ""), "the reason")
     graph.executor.remove_node(node)

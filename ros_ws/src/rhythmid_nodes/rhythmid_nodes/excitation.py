@@ -69,6 +69,8 @@ class ExcitationNode(GraphNode):
     A machine of several joints has other commands and measurements, see `joint_excitation`; all else is the same.
     """
 
+    HALTED = "the effort is zero at once, without fading"
+
     def __init__(self, parameters: tuple[Parameter, ...] = PARAMETERS, **options: Any) -> None:
         super().__init__("excitation", parameters, **options)
 
@@ -205,7 +207,8 @@ class ExcitationNode(GraphNode):
         with self._lock:
             playing = not self.lockstep and self._state in ("running", "ramping")
             if playing:
-                self._halt(self._wall.now(), "the node was ended or deactivated")
+                told = self._halt(self._wall.now(), "the node was ended or deactivated")
+                self.get_logger().info(told)
         if playing:
             for publisher in (self._output.publisher, self._run):
                 publisher.wait_for_all_acked(Duration(seconds=0.5))
@@ -330,12 +333,12 @@ class ExcitationNode(GraphNode):
         else:
             self._enter("stopped", "asked to stop")
 
-    def _halt(self, stamp_ns: int, reason: str) -> None:
-        """Stop at once, without fading, with a last command of zero."""
+    def _halt(self, stamp_ns: int, reason: str) -> str:
+        """Stop at once, without fading, with a last command of zero. Returns the line for the log."""
         if not self.lockstep:
             self._output.send(stamp_ns, self._nothing())
         self._enter("stopped", reason)
-        self.get_logger().error(f"excitation stopped: {reason}")
+        return f"excitation stopped: {reason}; {self.HALTED}"
 
     def _on_intrusion(self, conflict: str) -> None:
         with self._lock:
@@ -348,7 +351,7 @@ class ExcitationNode(GraphNode):
         """Stop, if it plays, because the run has failed."""
         if self._state in ("running", "ramping"):
             self.tripped = danger
-            self._halt(stamp_ns, danger)
+            self.get_logger().error(self._halt(stamp_ns, danger))
 
     def _on_measurement(self, data: bytes) -> None:
         sample = self._reader.read(data)

@@ -77,6 +77,8 @@ class JointsWatch:
 class JointExcitationNode(ExcitationNode):
     """Plays precomputed commands of all joints."""
 
+    HALTED = "forces are zero at once, without fading, and references keep their last value"
+
     def __init__(self, **options: Any) -> None:
         super().__init__(PARAMETERS, **options)
 
