@@ -1,6 +1,7 @@
 """Excitation over real topics: plays what the experiment says, and stops by itself when the machine is not safe."""
 
 import json
+import re
 import time
 
 import numpy as np
@@ -14,6 +15,7 @@ from std_msgs.msg import Float64, Float64MultiArray, String
 from rhythmid.errors import InputError
 from rhythmid.excitation.sequence import build
 from rhythmid.experiment import Safety, ramped
+from rhythmid_nodes import waiting
 from rhythmid_nodes.excitation import ExcitationNode
 from rhythmid_nodes.qos import latched
 
@@ -91,14 +93,29 @@ def test_it_plays_the_experiments_samples_on_a_grid_without_gaps(graph, excite):
     assert heard[-1].effort[0] == 0.0
 
 
-def test_it_does_not_start_before_there_is_a_measurement(graph):
-    graph.add(ExcitationNode, max_effort=1.0, excitation=json.dumps(CONSTANT))
+def test_it_does_not_start_before_there_is_a_measurement_and_says_where_it_looks(graph, monkeypatch, capfd):
+    monkeypatch.delenv("RHYTHMID_SUPERVISOR")  # who would say it
+    monkeypatch.setattr(waiting, "FIRST", 0.1)
+    said = "no measurement of joint leg on /arm/axes yet"
+    graph.add(
+        ExcitationNode, {"joint_states": "/arm/axes"}, max_effort=1.0, excitation=json.dumps(CONSTANT),
+        unattended=True,
+    )  # fmt: skip
     heard = graph.listen("excitation")
     graph.until(lambda: graph.nodes[0]._output.publisher.get_subscription_count() == 1, "a subscriber")
     answer = graph.call("excitation/start")
-    assert not answer.success and answer.message == "no measurement on joint_states yet"
+    assert not answer.success and answer.message == f"/hopper/recorder is not active; {said}"
     graph.spin(0.1)
     assert not heard
+    log = ""
+
+    def told():
+        nonlocal log
+        log += "".join(capfd.readouterr())
+        return "waiting: " in log
+
+    graph.until(told, "what it waits for")
+    assert said in log and "/hopper/recorder is not active" in log
 
 
 def test_it_does_not_start_before_everybody_listens(graph, excite):
@@ -230,12 +247,15 @@ def test_the_effort_is_clamped(graph, excite):
     assert {message.effort[0] for message in heard} == {0.2}
 
 
-def test_a_node_that_is_ended_leaves_a_zero_behind(graph, excite):
+def test_a_node_that_is_ended_leaves_a_zero_behind_and_reports_no_error(graph, excite, capfd):
     node, heard, run, _ = excite()
     start(graph)
     graph.until(lambda: len(heard) > 50, "samples")
     graph.nodes.remove(node)
     node.close()
+    log = "".join(capfd.readouterr())
+    assert re.search(r"\[INFO\].* the node was ended .*; the effort is zero at once", log), log
+    assert "[ERROR]" not in log
     graph.until(lambda: heard[-1].effort[0] == 0.0, "the last command")
     graph.until(lambda: "ended" in last_state(run).get("reason", ""), "the reason")
     graph.executor.remove_node(node)

@@ -24,6 +24,7 @@ from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
 from rhythmid.offline_run import perform
 from rhythmid.record.bag import Bag
+from rhythmid_bringup.start_up import STOPPED
 from rhythmid_nodes.joint_state import JointStateReader
 
 MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
@@ -245,6 +246,23 @@ def test_what_a_node_refuses_is_told_in_one_line_with_code_2(rhythmid, tmp_path)
     done = rhythmid("run", experiment_file(tmp_path, model="light.yaml"))
     assert done.returncode == 2 and len(done.stderr.strip().splitlines()) == 1, done.stderr
     assert "error: graph: " in done.stderr and "diverges" in done.stderr
+
+
+def test_stopped_before_it_begins_it_leaves_no_bag_and_says_so_in_one_line(started, tmp_path):
+    path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"})
+    run = started(
+        path, "--replace", f"plant={sys.executable} -c 'import time; time.sleep(600)'"
+    )  # it never begins
+    patience = time.monotonic() + PATIENCE
+    while "recorder" not in run.children():
+        assert run.process.poll() is None and time.monotonic() < patience
+        time.sleep(0.05)
+    children = run.children()
+    run.process.send_signal(signal.SIGINT)
+    code, said = run.end()
+    assert (code, said.splitlines()) == (0, [STOPPED])
+    assert not (tmp_path / "experiment_bag").exists()
+    assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
 
 
 @pytest.mark.parametrize(("layout", "number"), [("processes", signal.SIGINT), ("composed", signal.SIGTERM)])

@@ -138,6 +138,20 @@ def test_a_command_that_is_no_number_stops_the_guard(graph, robot):
     assert node.tripped == "a command of nan on /hopper/command"
 
 
+def test_a_stop_is_logged_once_however_long_it_takes_to_end(graph, robot, capfd):
+    node = graph.add(CommandGuard, max_effort=1.0, stale_after=0.5, command_timeout=0.0)
+    send = graph.talk("command")
+    graph.until(lambda: node._watch.speed == 0.5, "a measurement")
+    send(graph.joint_state(time.time_ns(), effort=0.3))
+    graph.until(lambda: robot and robot[-1][1] == 0.3, "effort")
+    for timer in graph.probe.timers:
+        timer.cancel()  # the robot stands still
+    graph.until(lambda: node.done and robot[-1][1] == 0.0, "the end")
+    graph.spin(0.1)
+    log = "".join(capfd.readouterr())
+    assert log.count("[ERROR]") == log.count("stopped: the newest measurement") == 1, log
+
+
 def test_a_machine_in_danger_gets_no_effort_from_the_guard(graph, robot):
     node = graph.add(CommandGuard, max_effort=1.0, envelope=[0.0, 0.1])
     send = graph.talk("command")

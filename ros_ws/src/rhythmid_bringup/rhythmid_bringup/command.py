@@ -15,6 +15,7 @@ from rhythmid.errors import InputError
 from rhythmid.ros_packages import not_installed
 
 from . import isolation
+from .start_up import start_up
 
 EXAMPLES = ("rhythmid run experiment.yaml --out bag", "rhythmid run experiment.yaml --node plant")
 
@@ -64,11 +65,12 @@ def add(app: typer.Typer) -> None:
             again = [argument for argument in sys.argv[1:] if argument != "--isolated"]
             line = isolation.isolated([sys.executable, "-m", "rhythmid.cli", *again])
             os.execvp(line[0], line)
-        try:  # ROS is slow to load, and the other commands do not need it
-            from rhythmid_bringup.run import console, replacements, run_alone, run_graph
-        except ModuleNotFoundError as missing:
-            raise not_installed("rhythmid run", str(missing.name)) from None
-        console.quiet = quiet
-        if node is not None:
-            raise typer.Exit(run_alone(experiment, out, node))
-        raise typer.Exit(run_graph(experiment, out, replacements(replace or ()), report))
+        with start_up() as state:
+            try:  # ROS is slow to load, and the other commands do not need it
+                from rhythmid_bringup.run import console, replacements, run_alone, run_graph
+            except ModuleNotFoundError as missing:
+                raise not_installed("rhythmid run", str(missing.name)) from None
+            console.quiet = quiet
+            if node is not None:
+                raise typer.Exit(run_alone(experiment, out, node))
+            raise typer.Exit(run_graph(experiment, out, state, replacements(replace or ()), report))

@@ -22,6 +22,7 @@ from rhythmid.output import require_new, require_writable
 from .arguments import command, ros_arguments
 from .environment import own_domain, run_environment
 from .report import write_report
+from .start_up import STOPPED, StartUp
 from .summary import show
 from .supervisor import Supervisor
 
@@ -71,18 +72,20 @@ def replacements(given: Sequence[str]) -> dict[str, list[str]]:
 def run_graph(
     path: Path,
     out: Path | None,
+    state: StartUp,
     replaced: Mapping[str, Sequence[str]] | None = None,
     report: Path | None = None,
 ) -> int:
     """Run the whole graph under supervision, with the commands `replaced` in the place of nodes; write a page `report`.
 
-    The exit code is 0 if the run was completed or the user stopped it, 1 if a node died or the excitation
+    The exit code is 0 if the run was completed or the user stopped it (no bag is left if it had not begun), 1 if a node died or the excitation
     stopped by itself. Raises InputError when a node refuses its parameters.
     """
     require_new(report)
     experiment = load(path, out)
     folder = Path(tempfile.mkdtemp(prefix="rhythmid-"))
     with own_domain() as domain, interruptions() as interrupted:
+        state.begun = True
         environment = run_environment(os.environ, domain, folder)
         os.environ.update(environment)  # the supervisor's own node must be in the same domain
         supervisor = Supervisor(experiment, folder, environment, console, interrupted, replaced)
@@ -91,6 +94,10 @@ def run_graph(
         shutil.rmtree(folder, ignore_errors=True)
     if outcome.code == 2:
         raise InputError(outcome.sentence)
+    if outcome.code == 0 and not supervisor.observed.run:  # the user stopped it before the excitation played
+        shutil.rmtree(experiment.record.path, ignore_errors=True)
+        console.print(STOPPED)
+        return 0
     mend(experiment.record.path)
     show(console, experiment, supervisor.observed, outcome)
     if report is not None:

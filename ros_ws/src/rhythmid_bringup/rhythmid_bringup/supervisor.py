@@ -71,6 +71,7 @@ class Supervisor:
         self._experiment, self._folder, self._environment = experiment, folder, environment
         self._console, self._interrupted = console, interrupted
         self._processes: list[Supervised] = []
+        self._began = False
         self._lockstep = experiment.time.mode == "lockstep"
         self._length = experiment.count * experiment.time.period_ns * 1e-9
         self._nodes = [spec.name for spec in experiment.nodes() if spec.name not in self._replaced]
@@ -112,6 +113,8 @@ class Supervisor:
         self._executor.spin_once(timeout_sec=0.05)
 
     def _tell(self, name: str, line: str) -> None:
+        if self._interrupted() and not self._began:
+            return  # a node that is ended while it loads has only a traceback to say
         self._console.print(f"[dim]{escape(f'[{name}]')}[/] {escape(line)}")
 
     def _launch(self) -> None:
@@ -194,6 +197,7 @@ class Supervisor:
 
     def _play(self, observer: Observer) -> Outcome:
         """Wait for the end of the run, the end of a node, or an interruption by the user."""
+        self._began = True
         started = time.monotonic()
         columns = (
             TextColumn("{task.description}"),

@@ -1,6 +1,6 @@
 """command_guard: the last node before a robot. It forwards `command` within limits, and ends a command that is not renewed.
 
-It sends the newest command at the robot's rate, never a backlog, with the robot's type on the robot's topic. The effort, its rate and
+It takes no commands before a node receives its own. It sends the newest command at the robot's rate, never a backlog, with the robot's type on the robot's topic. The effort, its rate and
 the power stay within their limits, whichever node commands. A second commander, a command that is not a number, or a machine in
 danger (see `watch`) stop it: zero effort at once, and exit code 1.
 """
@@ -26,11 +26,13 @@ from .joint_state import JointStateReader
 from .node import JOINT, PRIORITY, RATE, TIME_MODE, GraphNode, lapse_notice, run
 from .parameters import Parameter
 from .qos import stream, subscribe_informed
+from .receivers import Receivers
 from .watch import Watch
 from .watch_parameters import PARAMETERS as WATCHED
 from .watch_parameters import limits
 
 _FAR = math.inf
+_LOOK_PERIOD = 0.05  # seconds between two checks for a robot that receives the commands
 _INSIST = 0.5  # seconds for which zero is sent after the end of a command, because best-effort drives may miss a message
 PARAMETERS = (
     RATE,
@@ -60,7 +62,9 @@ class CommandGuard(GraphNode):
         if self.lockstep:
             raise InputError("parameter time_mode = 'lockstep': a robot has no simulated time")
         self._limits = EffortLimits(values["max_effort"], values["max_effort_rate"], values["max_power"])
-        self._watch = Watch(limits(values))
+        self._watch = Watch(
+            limits(values), f"joint {values['joint']} on {self.resolve_topic_name('joint_states')}"
+        )
         self._hold = self._new_hold()
         self._reader = JointStateReader(values["joint"])
         self._wall = Clock()
@@ -77,7 +81,8 @@ class CommandGuard(GraphNode):
         )  # fmt: skip
         self._authority = Authority(self, "command", self._stop)
         self._output_authority = Authority(self, self._output.publisher.topic, self._stop)
-        subscribe_informed(self, JointState, "command", self._on_command, stream(lockstep=False))
+        self._receivers = Receivers(self, self._output.publisher)
+        self._search = self.create_timer(_LOOK_PERIOD, self._listen)
         self.create_subscription(
             JointState, "joint_states", self._on_measurement, qos_profile_sensor_data, raw=True
         )
@@ -113,8 +118,7 @@ class CommandGuard(GraphNode):
         found = [self._watch.danger(self._wall.now())]
         if self.count_publishers(self._authority.topic) == 0:
             found.append(f"no publisher of {self._authority.topic}")
-        if self._output.publisher.get_subscription_count() == 0:
-            found.append(f"no subscriber of {self._output.publisher.topic}")
+        found.append(self._receivers.missing())
         return [obstacle for obstacle in found if obstacle]
 
     def stand_down(self) -> None:
@@ -123,6 +127,12 @@ class CommandGuard(GraphNode):
         if self._given_ns:
             self._zero()
             self._output.publisher.wait_for_all_acked(Duration(seconds=0.5))
+
+    def _listen(self) -> None:
+        """Subscribe to commands when somebody receives the guard's, so that whoever commands waits for that."""
+        if not self._receivers.missing():
+            self._search.cancel()
+            subscribe_informed(self, JointState, "command", self._on_command, stream(lockstep=False))
 
     def _on_command(self, data: bytes, about: dict[str, Any]) -> None:
         if not self._obeys or not self._authority.admits(about):
@@ -144,7 +154,7 @@ class CommandGuard(GraphNode):
             return
         now = self._wall.now()
         self._watch.hear(sample, now)
-        if self._engaged(now) and (danger := self._watch.danger(now)):
+        if not self.tripped and self._engaged(now) and (danger := self._watch.danger(now)):
             self._stop(danger)
 
     def _engaged(self, now_ns: int) -> bool:
@@ -167,7 +177,7 @@ class CommandGuard(GraphNode):
             self._give(stamp_ns, wanted)
         if self._hold.lapses:
             self.notice(lapse_notice(self.values["command_timeout"]))
-        if danger and engaged:
+        if danger and engaged and not self.tripped:
             self._stop(danger)
 
     def _give(self, stamp_ns: int, wanted: float) -> None:

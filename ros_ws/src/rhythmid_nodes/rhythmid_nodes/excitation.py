@@ -33,6 +33,7 @@ from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, Gra
 from .node_state import NodeState
 from .parameters import Parameter
 from .qos import latched, stream
+from .receivers import Receivers
 from .watch import Watch
 from .watch_parameters import PARAMETERS as WATCHED
 from .watch_parameters import limits
@@ -68,6 +69,8 @@ class ExcitationNode(GraphNode):
     A machine of several joints has other commands and measurements, see `joint_excitation`; all else is the same.
     """
 
+    HALTED = "the effort is zero at once, without fading"
+
     def __init__(self, parameters: tuple[Parameter, ...] = PARAMETERS, **options: Any) -> None:
         super().__init__("excitation", parameters, **options)
 
@@ -86,6 +89,7 @@ class ExcitationNode(GraphNode):
         self._lock = threading.Lock()  # measurements and services come on another thread than ticks
         self._output: Any = self._commander()
         self._authority = Authority(self, self._output.publisher.topic, self._on_intrusion)
+        self._receivers = Receivers(self, self._output.publisher)
         self._run = self.create_publisher(String, "run", latched())
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/stop", self._on_stop)
@@ -125,7 +129,9 @@ class ExcitationNode(GraphNode):
     def _judge(self) -> Any:
         """Reads and judges measurements."""
         self._reader: Any = JointStateReader(self.values["joint"])
-        return Watch(limits(self.values))
+        return Watch(
+            limits(self.values), f"joint {self.values['joint']} on {self.resolve_topic_name('joint_states')}"
+        )
 
     def _command(self) -> NDArray[np.float64]:
         """u(t) [N] on the grid, faded and clamped: the same numbers as in a run without ROS."""
@@ -169,7 +175,8 @@ class ExcitationNode(GraphNode):
         }
 
     def obstacles(self) -> list[str]:
-        found = [self._unheard(), self._authority.conflict(), self._unrecorded()]
+        received = self._receivers.missing() if self.values["subscribers"] else ""
+        found = [self._unheard() or received, self._authority.conflict(), self._unrecorded()]
         if not self.lockstep:
             found.append(self._watch.danger(self._wall.now()))
         return [obstacle for obstacle in found if obstacle]
@@ -181,8 +188,10 @@ class ExcitationNode(GraphNode):
 
     def _unrecorded(self) -> str:
         """Message that the recorder is not active, for an unattended run; else empty."""
-        waits = self._recorder is not None and self._state == "idle" and not self._recorder.active
-        return f"{self.values['recorder']} is not active" if waits else ""
+        recorder = self._recorder
+        if recorder is None or self._state != "idle" or recorder.active:
+            return ""
+        return f"{recorder.name} is not active"
 
     def _other_graphs(self) -> list[str]:
         """Namespaces of the other excitations in this DDS domain; each is reported once."""
@@ -198,7 +207,8 @@ class ExcitationNode(GraphNode):
         with self._lock:
             playing = not self.lockstep and self._state in ("running", "ramping")
             if playing:
-                self._halt(self._wall.now(), "the node was ended or deactivated")
+                told = self._halt(self._wall.now(), "the node was ended or deactivated")
+                self.get_logger().info(told)
         if playing:
             for publisher in (self._output.publisher, self._run):
                 publisher.wait_for_all_acked(Duration(seconds=0.5))
@@ -323,12 +333,12 @@ class ExcitationNode(GraphNode):
         else:
             self._enter("stopped", "asked to stop")
 
-    def _halt(self, stamp_ns: int, reason: str) -> None:
-        """Stop at once, without fading, with a last command of zero."""
+    def _halt(self, stamp_ns: int, reason: str) -> str:
+        """Stop at once, without fading, with a last command of zero. Returns the line for the log."""
         if not self.lockstep:
             self._output.send(stamp_ns, self._nothing())
         self._enter("stopped", reason)
-        self.get_logger().error(f"excitation stopped: {reason}")
+        return f"excitation stopped: {reason}; {self.HALTED}"
 
     def _on_intrusion(self, conflict: str) -> None:
         with self._lock:
@@ -341,7 +351,7 @@ class ExcitationNode(GraphNode):
         """Stop, if it plays, because the run has failed."""
         if self._state in ("running", "ramping"):
             self.tripped = danger
-            self._halt(stamp_ns, danger)
+            self.get_logger().error(self._halt(stamp_ns, danger))
 
     def _on_measurement(self, data: bytes) -> None:
         sample = self._reader.read(data)

@@ -45,7 +45,7 @@ class JointCommander:
 class JointsWatch:
     """Judges the measurements of all joints, each by its own limits."""
 
-    def __init__(self, experiment: JointExperiment, joints: tuple[str, ...]) -> None:
+    def __init__(self, experiment: JointExperiment, joints: tuple[str, ...], topic: str) -> None:
         safety = experiment.safety
         self._watches: dict[str, Watch] = {}
         for joint in joints:
@@ -57,7 +57,8 @@ class JointsWatch:
                     own.max_speed,
                     safety.frozen_after,
                     safety.max_gap,
-                )
+                ),
+                f"joint {joint} on {topic}",
             )
 
     def hear(self, samples: list[Sample], arrived_ns: int) -> None:
@@ -76,6 +77,8 @@ class JointsWatch:
 class JointExcitationNode(ExcitationNode):
     """Plays precomputed commands of all joints."""
 
+    HALTED = "forces are zero at once, without fading, and references keep their last value"
+
     def __init__(self, **options: Any) -> None:
         super().__init__(PARAMETERS, **options)
 
@@ -91,7 +94,7 @@ class JointExcitationNode(ExcitationNode):
 
     def _judge(self) -> JointsWatch:
         self._reader = JointStatesReader(self._machine.joints)
-        return JointsWatch(self._experiment, self._machine.joints)
+        return JointsWatch(self._experiment, self._machine.joints, self.resolve_topic_name("joint_states"))
 
     def _commander(self) -> JointCommander:
         publisher = self.create_publisher(JointState, "command", stream(self.lockstep))

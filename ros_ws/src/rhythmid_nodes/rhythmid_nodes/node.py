@@ -29,8 +29,11 @@ from .diagnostics import Diagnostics
 from .lifecycle import LIFECYCLE
 from .managed_node import ManagedNode
 from .parameters import Parameter, declare
+from .waiting import Waiting
 
 _PR_SET_PDEATHSIG = 1
+_SUPERVISOR = "RHYTHMID_SUPERVISOR"  # process id of the supervisor, which itself says what is waited for
+_WAITING_PERIOD = 0.5  # seconds between two checks whether the node still waits
 _LAST_WORDS = 0.1  # seconds
 _NAMING = (
     2.0  # seconds that a tripped node waits for the name of a foreign node, which arrives after its messages
@@ -80,6 +83,9 @@ class GraphNode(ManagedNode):
         self.lockstep = self.values["time_mode"] == "lockstep"
         self.tripped = ""  # why the node stopped its work early, if it did; the process then ends with code 1
         self.diagnostics = Diagnostics(self, self._all_figures, self._all_obstacles, lambda: self.tripped)
+        self._waiting_lines = Waiting()
+        if _SUPERVISOR not in os.environ:
+            self.create_timer(_WAITING_PERIOD, self._tell_waiting)
         self.manage(self.values["autostart"])
 
     @property
@@ -101,8 +107,15 @@ class GraphNode(ManagedNode):
     def _all_obstacles(self) -> list[str]:
         return self.obstacles() if self.active else [self.managed_state]
 
+    def _tell_waiting(self) -> None:
+        obstacles = self.obstacles() if self.active and not self.tripped else []
+        if self._waiting_lines.due(bool(obstacles), time.monotonic()):
+            self.get_logger().warning(f"waiting: {'; '.join(obstacles)}")
+
     def trip(self, reason: str) -> None:
-        """Stop permanently because of `reason`: report it, and end the process soon. The last reported reason counts."""
+        """Stop permanently because of `reason`: report it, and end the process soon. The first reason counts, until an unnamed node gets its name."""
+        if self.tripped and UNNAMED not in self.tripped:
+            return
         self.tripped = reason
         self.get_logger().error(f"stopped: {reason}")
         if UNNAMED in reason:
@@ -136,7 +149,7 @@ def _refuse_sim_time(parameters: list[RosParameter]) -> SetParametersResult:
 
 def _end_with_supervisor() -> None:
     """Make the kernel send SIGINT when the supervising process dies for any reason."""
-    supervisor = os.environ.get("RHYTHMID_SUPERVISOR")
+    supervisor = os.environ.get(_SUPERVISOR)
     if supervisor is not None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
         if os.getppid() != int(supervisor):

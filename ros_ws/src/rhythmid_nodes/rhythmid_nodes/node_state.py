@@ -17,12 +17,14 @@ class NodeState:
 
     Attributes
     ----------
+    name : its full name.
     active : whether it was active; False before the first answer.
     """
 
     def __init__(self, node: Node, name: str) -> None:
         self.active = False
         self._client = node.create_client(GetState, f"{name}/get_state")
+        self.name = self._client.service_name.removesuffix("/get_state")
         self._answer: Any = None
         self._asked_at = 0.0
 

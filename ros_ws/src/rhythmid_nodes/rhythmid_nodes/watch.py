@@ -37,15 +37,16 @@ class Limits:
 
 class Watch:
     """Judges measurements one by one (`hear`) and their absence (`danger`), from any thread. Times are nanoseconds of this computer's clock.
+    `measured` says in messages what is measured, and where.
 
     Attributes
     ----------
     speed : of the newest measurement [m/s], from successive positions if the message does not contain it; NaN before the first one.
     """
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: Limits, measured: str = "the machine") -> None:
         self.speed = math.nan
-        self._limits = limits
+        self._limits, self._measured = limits, measured
         self._lock = (
             threading.Lock()
         )  # its own: a busy clock thread that holds another for long keeps no measurement waiting
@@ -76,7 +77,7 @@ class Watch:
         with self._lock:
             sample, stale = self._newest, self._limits.stale_after
             if sample is None:
-                return "no measurement on joint_states yet" if stale > 0.0 else ""
+                return f"no measurement of {self._measured} yet" if stale > 0.0 else ""
             return self._state(sample) or self._age(sample, now_ns)
 
     def _state(self, sample: Sample) -> str:
