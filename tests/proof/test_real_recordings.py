@@ -41,7 +41,7 @@ force:
   - coulomb_friction: {{force: {{value: {coulomb}, fixed: true}}, transition: {{value: 0.02, fixed: true}}}}
   - constant_force: {{force: {{value: {push}, fixed: true}}}}
 """
-NAMED_LATER = pytest.mark.skip(reason="long, or not reached yet: see docs/real.md")
+NOT_REACHED = pytest.mark.skip(reason="not reached with every version: see docs/real.md")
 
 
 def present(name: str) -> pytest.MarkDecorator:
@@ -233,23 +233,23 @@ def test_a_frictionless_pendulum_is_told_that_it_lacks_friction(pendulum_told):
     assert pendulum_told.verdict == "missing_physics" and sum(pendulum_told.probabilities[:1]) >= 0.8
 
 
-@NAMED_LATER
+@pytest.mark.long
 @present("pendulum")
 def test_a_hand_that_pushes_the_pendulum_unrecorded_makes_no_wrong_name(cases, tmp_path):
     told = diagnosed(cases["pendulum whole files"], tmp_path)
     assert not told.names or told.names[0] in COULOMB_FAMILY or max(told.probabilities) < 0.8
 
 
-@NAMED_LATER
+@pytest.mark.long
 @present("xl330")
-@pytest.mark.parametrize("nominal", ["xl330", "xl330 with Coulomb"])
+@pytest.mark.parametrize("nominal", ["xl330", pytest.param("xl330 with Coulomb", marks=NOT_REACHED)])
 def test_the_servo_s_friction_grows_with_its_load(cases, tmp_path, nominal):
     told = diagnosed(cases[nominal], tmp_path)
     assert told.verdict == "missing_physics" and told.names[0] in LOAD_FRICTION
     assert told.after < 0.6 * told.before
 
 
-@NAMED_LATER
+@NOT_REACHED
 @present("go2")
 @pytest.mark.parametrize("joint", ["thigh", "calf"])
 def test_left_and_right_joints_of_a_leg_lack_the_same_friction(cases, tmp_path, joint):
@@ -261,7 +261,7 @@ def test_left_and_right_joints_of_a_leg_lack_the_same_friction(cases, tmp_path, 
     assert len(names) == 1
 
 
-@NAMED_LATER
+@pytest.mark.long
 @present("silverbox")
 def test_the_hardening_spring_is_named_from_the_bench(cases, tmp_path):
     case = cases["silverbox"]
