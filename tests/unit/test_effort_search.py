@@ -151,9 +151,9 @@ def test_gravity_and_effort_do_not_extinguish_each_other():
 def test_no_model_sees_the_effort_that_it_predicts():
     record = axis()
     assert record.input is not None
-    silent = replace(record, input=replace(record.input, value=0.0 * record.input.value))
+    another = replace(record, input=replace(record.input, value=record.input.value[::-1]))
     balance = Balance.of([record], axis_model())
-    other = Balance.of([silent], axis_model(), balance.bandwidth)
+    other = Balance.of([another], axis_model(), balance.bandwidth)
     for name, values in (
         ("load_dependent_friction", {"coefficient": 0.1, "transition": 0.02}),
         ("actuator_deadband", {"threshold": 0.1}),
