@@ -41,7 +41,7 @@ force:
   - coulomb_friction: {{force: {{value: {coulomb}, fixed: true}}, transition: {{value: 0.02, fixed: true}}}}
   - constant_force: {{force: {{value: {push}, fixed: true}}}}
 """
-NOT_REACHED = pytest.mark.skip(reason="not reached with every version: see docs/real.md")
+NOT_REACHED = pytest.mark.xfail(reason="not reached with every version: see docs/real.md", strict=False)
 
 
 def present(name: str) -> pytest.MarkDecorator:
@@ -250,6 +250,7 @@ def test_the_servo_s_friction_grows_with_its_load(cases, tmp_path, nominal):
 
 
 @NOT_REACHED
+@pytest.mark.long
 @present("go2")
 @pytest.mark.parametrize("joint", ["thigh", "calf"])
 def test_left_and_right_joints_of_a_leg_lack_the_same_friction(cases, tmp_path, joint):

@@ -27,7 +27,7 @@ EQUATIONS = {  # for quantities that are not elements: slot, meaning, and the na
     "link_mass": ("body", "m → m′, shape kept", "mass"),
     "link_inertia": ("body", "J → J′ about the centre of mass, along the joint's axis", "inertia"),
     "link_centre_of_mass": ("body", "c → c′, mass and inertia about the centre kept", "x, y, z"),
-    "link_mass_and_centre": ("body", "m, c → m′, c′, shape of the inertia kept", "mass, x, y, z"),
+    "link_mass_and_centre": ("body", "m, c, I → m′, c′, I′", "mass, x, y, z"),
     "payload": ("body", "point mass m at the end of the link", "mass"),
     "actuator_delay": ("actuator", "f(t) → f(t − τ)", "delay"),
     "input_delay": ("command", "r(t) → r(t − τ)", "delay"),
