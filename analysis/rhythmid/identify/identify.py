@@ -226,7 +226,7 @@ def _identified(
     seen = _Seen(given, nominal, tuple(pumpings), tuple(results))
     found = _by_likelihood(seen, forcing, offset, htf, tell) if method == "joint" else None
     return found or _by_paper(
-        seen, htf if method == "joint" or htf != "auto" else "regularised_least_squares", method
+        seen, htf if method == "joint" or htf != "auto" else "regularised_least_squares"
     )
 
 
@@ -289,7 +289,7 @@ class _Seen:
         return (not_identified(nrmse, response), *told, *cautions)
 
 
-def _by_paper(seen: _Seen, htf: HtfMethod, method: Method) -> Identification:
+def _by_paper(seen: _Seen, htf: HtfMethod) -> Identification:
     """Parameters and delays by the paper's method: average over records, weighted by inverse variance."""
     records, results = seen.records, seen.paper
     first = results[0]

@@ -70,7 +70,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     """The diagnosis."""
     found, decision, contest = result.search, result.decision, result.contest
     series = found.fit.run.series
-    repeats = noise_from_repeats(list(series))
+    repeats = noise_from_repeats(series)
     best = found.best
     fit = found.fit
     missing = missing_effects(fit.model, decision, lambda name: estimated(fit, name))

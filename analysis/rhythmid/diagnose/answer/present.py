@@ -112,7 +112,7 @@ def findings(
     if added:
         models["Augmented model"] = causal(found.fit.model).to_yaml()
     count = max(len(found.rounds[0].scores), 1)
-    repeats = noise_from_repeats(list(found.fit.run.series))
+    repeats = noise_from_repeats(found.fit.run.series)
     return Findings(
         result=diagnosis.to_dict(),
         source=f"{name} against {listed([r.name for r in records])}",

@@ -4,7 +4,7 @@ The types define the contract: `python -m rhythmid.diagnose.answer.result` print
 """
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from pydantic import TypeAdapter
@@ -167,7 +167,7 @@ class Diagnosis:
     calibration: tuple[str, ...] = ()
     excluded: tuple[Untried, ...] = ()
     heldout: str = ""
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
     chosen: tuple[str, ...] = ()
     families: tuple[MissingFamily, ...] = ()
 

@@ -50,17 +50,12 @@ class Fitted:
         late = max(value.value + self.fit.alignment, value.bounds[0])
         return model.with_parameters({name: replace(value, value=late)})
 
-    @property
-    def size(self) -> int:
-        """Number of parameters."""
-        return len(self.fit.names)
-
     def claimed(self, prediction: Prediction, nrmse: float | None = None) -> Hypothesis:
         """The hypothesis with its prediction, and its error on held-out data relative to the effort's variation."""
         model = self.fit.model
         values = {name: model.value(name) for name in self.fit.names}
         return Hypothesis.of(
-            model, self.elements, self.kind, self.size, prediction, nrmse, self.shape, values
+            model, self.elements, self.kind, len(values), prediction, nrmse, self.shape, values
         )
 
     def std(self) -> dict[str, float]:

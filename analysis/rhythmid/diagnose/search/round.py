@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 MISFIT = 0.1  # error, as a share of the motion, from which a residual with autocorrelation is not whitened
 # windows in which the catalogue is scored: enough for all amplitudes, few enough to cost less than the records
 WINDOWS = 40
+MOST_REMOVED = 60  # number of guesses whose effects are removed from a residual before its noise is estimated
 REMEMBERED = 4  # minimum length of a window, in correlation times of the noise
 
 
@@ -82,9 +83,7 @@ def distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Scor
     return [(group[0], group) for group in list(found.values())[:count]]
 
 
-def noise_without(
-    fit: Fit, changes: Iterable[Change], filters: Iterable[tuple[Array, ...]] = (), most: int = 60
-) -> NoiseModel:
+def noise_without(fit: Fit, changes: Iterable[Change], filters: Iterable[tuple[Array, ...]]) -> NoiseModel:
     """Noise model of the residual after removing what the catalogue's best guesses and linear filters explain together.
 
     The residual of a model that lacks an effect is not noise. A regular motion can be predicted from its own past; it would be taken
@@ -93,7 +92,7 @@ def noise_without(
     catalogue may lack.
     """
     samples = sum(int(one.used.sum()) for one in fit.run.series)
-    best = best_changes(fit, changes, min(most, samples // 50))
+    best = best_changes(fit, changes, min(MOST_REMOVED, samples // 50))
     residuals = [r.copy() for r in fit.residuals]
     share = 1.0
     picked = [*(one.outputs for one in best), *filters]

@@ -109,7 +109,7 @@ def _searched(motion: RecordedMotion, free: bool) -> Readings:
     best = motion.as_declared
     least = score(best)
     while True:
-        tried = ((score(one), one) for one in _changed(motion, best, free))
+        tried = ((score(one), one) for one in _changed(motion, best))
         found, reading = min(tried, key=lambda one: one[0])
         if found >= least:
             tried = ((score(one), one) for one in _cycled(best))
@@ -145,7 +145,7 @@ def _with(readings: Readings, place: int, one: Reading) -> Readings:
     return (*readings[:place], one, *readings[place + 1 :])
 
 
-def _changed(motion: RecordedMotion, readings: Readings, free: bool) -> Iterator[Readings]:
+def _changed(motion: RecordedMotion, readings: Readings) -> Iterator[Readings]:
     """Readings with one further change: of all joints, of one, or an exchange of two."""
     turned = [replace(one, effort=-one.effort) for one in readings]
     yield tuple(turned)
