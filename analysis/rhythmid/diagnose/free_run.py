@@ -275,12 +275,12 @@ def _with_jitter(scoring: Scoring) -> Calibration:
 
 
 def _trial_of(hypothesis: Hypothesis, contenders: Sequence[Contender]) -> Trial:
-    return next(one.trial for one in contenders if tuple(sorted(one.trial.added)) == hypothesis.key)
+    return next(one.trial for one in contenders if one.trial.key == hypothesis.key)
 
 
 def _with_best(found: Search, trial: Trial, case: Case) -> Search:
     """The search with another chosen model."""
-    if tuple(sorted(trial.added)) == tuple(sorted(found.best.added)):
+    if trial.key == found.best.key:
         return found
     fit = whole_fit(trial, found.fit.run.series, found.noise, found.fit.run.max_step, pool=case.pool)
     nominal = under(found.nominal, found.noise, case.pool)
@@ -342,5 +342,5 @@ def _maps(
 
 def _detectable(contenders: Sequence[Contender], chosen: Hypothesis, rows: Rows) -> float:
     """The smallest detectable rms in these records, relative to the size that errors are a share of."""
-    error = next(one.error for one in contenders if tuple(sorted(one.trial.added)) == chosen.key)
+    error = next(one.error for one in contenders if one.trial.key == chosen.key)
     return detectable(error, autocorrelation_time(error, rows.record)) / max(rows.size, 1e-300)

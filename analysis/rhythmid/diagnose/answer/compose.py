@@ -78,14 +78,14 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     plain = FitQuality(found.nominal.nrmse(), contest.nominal.heldout_nrmse)
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
     rivals = [t for t in found.trials if len(t.added) == len(best.added) and t.bic() - best.bic() < RIVALS]
-    heldout = {tuple(sorted(one.elements)): one.heldout_nrmse for one in contest.hypotheses}
+    heldout = {one.key: one.heldout_nrmse for one in contest.hypotheses}
     alternatives = tuple(
         Alternative(
             tuple(t.element(label).name for label in t.added),
             t.bic() - best.bic(),
-            heldout.get(tuple(sorted(t.added))),
+            heldout.get(t.key),
         )
-        for t in [t for t in found.trials if set(t.added) != set(best.added)][:SHOWN]
+        for t in [t for t in found.trials if t.key != best.key][:SHOWN]
     )
     part = "record" if result.scoring.kind == "free_run" else "window"
     drawn = {one.quantity: (one.grid, one.force) for one in result.after}

@@ -37,7 +37,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     sizes = scales_of(result.search.balance, chosen.fit.model)
     missing = without_untold(missing, chosen.fit.model, sizes)
     before, after = (
-        FitQuality(one.fit.error / size, _error(result, one) / size) for one in (nominal, chosen)
+        FitQuality(one.fit.error / size, result.errors[one.key] / size) for one in (nominal, chosen)
     )
     freed = freed_value(case.nominal, chosen.fit.model, result.selection.chosen)
     slots = list(dict.fromkeys(effect.slot for effect in missing))
@@ -80,10 +80,6 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         heldout=held,
         notes=(*notes, *separate_zeros_notes((*case.records[:1], *case.holdout))),
     )
-
-
-def _error(result: EffortResult, fitted: Fitted) -> float:
-    return result.errors[tuple(sorted(fitted.elements))]
 
 
 def _estimate(fitted: Fitted, name: str) -> Estimate:

@@ -164,9 +164,9 @@ def next_experiment(found: Search, rivals: Sequence[Trial], series: Sequence[Ser
     """One sentence: what to record next, and which question that decides."""
     best = found.best
     none, more = (NONE_FREE, MORE_FREE) if scales(series, best.model).idle else (NONE, MORE)
-    others = [t for t in rivals if set(t.added) != set(best.added)]
+    others = [t for t in rivals if t.key != best.key]
     if not others:
-        others = [t for t in found.trials if set(t.added) != set(best.added)]
+        others = [t for t in found.trials if t.key != best.key]
     if not others or (verdict == "consistent" and len(found.trials) < 2):
         return more if verdict == "undecided" else none
     menu = separation(best, others[0], series, found.noise.variance, found.fit.run.max_step)

@@ -39,6 +39,11 @@ class Fitted:
         return cls(elements, kind, fit, priors, linearised)
 
     @property
+    def key(self) -> tuple[str, ...]:
+        """The elements in alphabetical order, equal for equal structures."""
+        return tuple(sorted(self.elements))
+
+    @property
     def model(self) -> Model:
         """The fitted model; the additional delay found by the fit is added to its input delay, if it has one."""
         model, name = self.fit.model, INPUT_DELAY

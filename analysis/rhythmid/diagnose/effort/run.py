@@ -169,7 +169,7 @@ def effort_run(
     }
 
     def claimed(one: Fitted, errors_of: CrossValidated) -> Hypothesis:
-        return one.claimed(made(errors_of), errors[tuple(sorted(one.elements))] / size)
+        return one.claimed(made(errors_of), errors[one.key] / size)
 
     maps = {quantity: made(one) for quantity, one in mapped.items()}
     contest = Contest(
@@ -183,7 +183,7 @@ def effort_run(
         cut_short=found.cut_short,
     )
     selection = select(contest)
-    chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
+    chosen = next(one for one in found.hypotheses if one.key == selection.chosen.key)
     if places == 1:  # with several joints the error of one may be caused by another
         lasting = lasting_share(predicted[chosen.elements].error, rows.record, GAP)
         contest = replace(contest, structured_after=lasting)

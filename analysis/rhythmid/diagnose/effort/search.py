@@ -153,7 +153,7 @@ class _Search:
     @property
     def set_aside(self) -> tuple[Fitted, ...]:
         """Hypotheses that were ruled out, one of each structure, unless another fit of that structure was kept."""
-        kept = {tuple(sorted(one.elements)): one for one in self.ruled_out if not self._known(one)}
+        kept = {one.key: one for one in self.ruled_out if not self._known(one)}
         return tuple(kept.values())
 
     def cut_off(self, parent: Fitted) -> dict[str, str]:
@@ -383,7 +383,7 @@ class _Search:
         return late_start(self.balance, self.nominal.fit)[0]
 
     def _known(self, fitted: Fitted) -> bool:
-        return any(set(one.elements) == set(fitted.elements) for one in self.found)
+        return any(one.key == fitted.key for one in self.found)
 
 
 def _worst(*shapes: Mapping[str, float]) -> dict[str, float]:
