@@ -105,6 +105,11 @@ class Blocks:
         """Number of blocks."""
         return len(self.fold)
 
+    @property
+    def seen_rows(self) -> NDArray[np.bool_]:
+        """Rows (n,) that a fit sees."""
+        return self.fold[self.block] != UNSEEN
+
     def sums(self, values: Array) -> Array:
         """Sums (b,) of values (n,) over the blocks."""
         return np.asarray(np.bincount(self.block, values, self.count), dtype=np.float64)
@@ -116,14 +121,13 @@ class Blocks:
 
     def left_out(self, fold: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Rows (n,) that a fold leaves out, and rows (n,) that its fit sees: the others without gaps and unseen blocks."""
-        of_row = self.fold[self.block]
-        out = of_row == fold
+        out = self.fold[self.block] == fold
         near = out.copy()
         for shift in range(1, self.gap + 1):
             near[shift:] |= out[:-shift]
             near[:-shift] |= out[shift:]
-        seen = ~near & (of_row != UNSEEN)
-        return out, seen if seen.any() else ~out & (of_row != UNSEEN)
+        seen = ~near & self.seen_rows
+        return out, seen if seen.any() else ~out & self.seen_rows
 
 
 @dataclass(frozen=True)
@@ -172,7 +176,7 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
 
 def _unit_information(residual: Array, jacobian: Array, blocks: Blocks) -> Array:
     """Average information (p, p) on the parameters of one row that the folds see."""
-    seen = blocks.fold[blocks.block] != UNSEEN
+    seen = blocks.seen_rows
     spread = max(scale_of(residual[seen]), blocks.least)
     weight = np.where(seen, weights_of(residual, spread) / spread**2, 0.0)
     return _normal_equations(jacobian, weight, residual)[0] / max(int(seen.sum()), 1)

@@ -117,10 +117,10 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     trial = _trial_of(chosen, contenders)
     if trial.added != found.best.added:
         run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
+    nominal = next(one.trial for one in contenders if one.kind == "nominal")
     if case.budget.spent:
         found = _untried(found, OTHER_KINDS)
     elif chosen.kind != "freed_value":
-        nominal = next(one.trial for one in contenders if one.kind == "nominal")
         weighed = [one.trial for one in contenders]
         case.tell("trying other kinds of explanation")
         with deadline(case.budget.at(WEIGHED)):
@@ -141,7 +141,6 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         nominal_run = trajectories(found.nominal)
         before = dependences(nominal_run, rows, case.pool)
         if not case.budget.spent:
-            nominal = next(one.trial for one in contenders if one.kind == "nominal")
             refitted = refitted_map(nominal, before, nominal_run, seen, rows, step)
     maps = _maps(after, refitted, contenders, rows)
     contest = _contest(contenders, maps, rows, found, run, sizes, structured)

@@ -100,8 +100,8 @@ class _Rows:
     @property
     def judged(self) -> NDArray[np.bool_]:
         """Rows of held-out records; without any, all rows, each predicted by the fit that did not see it."""
-        held = self.blocks.fold[self.blocks.block] < 0
-        return held if held.any() else ~held
+        seen = self.blocks.seen_rows
+        return seen if seen.all() else ~seen
 
 
 def _rows(case: Case, found: EffortSearch, heldout: Balance | None) -> _Rows:
