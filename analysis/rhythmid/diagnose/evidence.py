@@ -31,6 +31,7 @@ from rhythmid.diagnose.constants import (
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.varying_scale import block_densities
+from rhythmid.identify.least_squares import column_norms
 from rhythmid.identify.student import autocorrelation_time, scale_of, weights_of
 
 Array = NDArray[np.float64]
@@ -152,8 +153,7 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
     """
     residual, jacobian = fit.residual, fit.jacobian
     error, scale = residual.copy(), np.ones(blocks.count)
-    norms = np.linalg.norm(jacobian, axis=0)
-    norms[norms == 0.0] = 1.0
+    norms = column_norms(jacobian)
     precision, pull = np.diag(fit.precision / norms**2), fit.precision * fit.departure / norms
     precision = precision + _unit_information(residual, jacobian, blocks) / np.outer(norms, norms)
     for fold in np.unique(blocks.fold):

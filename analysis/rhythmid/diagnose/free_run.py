@@ -37,7 +37,6 @@ from rhythmid.diagnose.search.round import distinct
 from rhythmid.diagnose.search.score_tests import (
     Trajectories,
     changes_of,
-    projected,
     trajectories,
     under,
     whitened,
@@ -253,7 +252,7 @@ def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.floa
     columns = np.empty((len(line.residual), len(tried) + len(maps)), order="F")
     count = 0
     for outputs in chain((one.outputs for one in changes_of(run, tried, case.pool)), maps):
-        columns[:, count] = projected(fit, whitened(fit, outputs, fit.noise))
+        columns[:, count] = line.without_starts(whitened(fit, outputs, fit.noise))
         count += 1
     columns = columns[:, :count]
     priors = [fit.model.parameters[name].prior for name, one in zip(fit.names, known) if one]

@@ -23,6 +23,7 @@ from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.search.refit import whole_fit
 from rhythmid.errors import InputError
 from rhythmid.identify.descent import descend
+from rhythmid.identify.least_squares import column_norms
 from rhythmid.identify.output_error import Fit
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.model import Model
@@ -179,12 +180,11 @@ def _rises(fit: Fit, ways: Sequence[_Way], pool: ThreadPoolExecutor | None) -> l
 
 def _rise(problem: Problem, fit: Fit, place: int, residuals: Sequence[Array]) -> float:
     columns = np.delete(fit.linearisation.jacobian, place, axis=1)
-    norms = np.linalg.norm(columns, axis=0)
-    others, _ = np.linalg.qr(columns / np.where(norms > 0.0, norms, 1.0))
+    others, _ = np.linalg.qr(columns / column_norms(columns))
 
     def left(given: Sequence[Array]) -> float:
         white = [problem.whitened(index, residual) for index, residual in enumerate(given)]
-        rest = np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
+        rest = fit.linearisation.without_starts(white)
         return float(np.sum((rest - others @ (others.T @ rest)) ** 2))
 
     with np.errstate(over="ignore", invalid="ignore"):

@@ -26,7 +26,7 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
-from rhythmid.identify.least_squares import reduced
+from rhythmid.identify.least_squares import column_norms, reduced
 from rhythmid.identify.multiple_shooting import periods_long, windows
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, coloured, minimise
@@ -101,8 +101,7 @@ def noise_without(fit: Fit, changes: Iterable[Change], filters: Iterable[tuple[A
         design, target = reduced(
             (np.column_stack([c[i][u] for c in picked]), residuals[i][u]) for i, u in enumerate(used)
         )
-        norms = np.linalg.norm(design, axis=0)
-        norms[norms == 0.0] = 1.0
+        norms = column_norms(design)
         solution, _, rank, _ = np.linalg.lstsq(design / norms, -target, rcond=1e-6)
         solution = solution / norms
         share = samples / max(samples - int(rank), 1)

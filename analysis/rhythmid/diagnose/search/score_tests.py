@@ -246,11 +246,6 @@ def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Arra
     return [one.whitened(noise, given, one.stretches(noise)) for one, given in zip(series, samples)]
 
 
-def projected(fit: Fit, white: Sequence[Array]) -> Array:
-    """A whitened change of each series on the fit's rows (n,), with the effect of initial states projected out."""
-    return np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
-
-
 def parameter_basis(fit: Fit) -> tuple[Array, Array]:
     """Orthonormal basis (n, r) of the output changes by the free parameters, and the parameter changes (p, r) of each."""
     jacobian = fit.linearisation.jacobian
@@ -332,7 +327,7 @@ def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change]
         with np.errstate(over="ignore", invalid="ignore"):  # changes that overflow in whitening are left out
             white = whitened(fit, one.outputs, fit.noise)
             raw = math.sqrt(sum(float(w @ w) for w in white))
-            joined = projected(fit, white)
+            joined = fit.linearisation.without_starts(white)
             change = joined - left @ (left.T @ joined)
             strength = float(change @ change)
         if not math.isfinite(strength) or raw == 0.0 or strength <= (1e-6 * raw) ** 2:
