@@ -157,7 +157,7 @@ def _fitted(
     for _ in range(ROUNDS):
         rows = [
             weighted_rows(
-                rows_of(now, joint, with_body_of(now, joint, paths[joint]), found[joint].late, link)
+                rows_of(now, joint, with_body_of(now.models[joint], paths[joint]), found[joint].late, link)
             )
             for joint in joints
         ]

@@ -25,16 +25,15 @@ from rhythmid.value import Prior
 
 def own_path(balances: JointBalances, one: JointResult) -> Model:
     """The path of a joint with the effects found there, and with the values of the body and of its rotor as they are given."""
-    model = with_body_of(balances, one.joint, one.result.chosen.fit.model)
-    return replace(model, mass=balances.models[one.joint].mass)
+    nominal = balances.models[one.joint]
+    return replace(with_body_of(nominal, one.result.chosen.fit.model), mass=nominal.mass)
 
 
-def with_body_of(balances: JointBalances, joint: str, model: Model, kept: bool = False) -> Model:
-    """A path of a joint with the values of the body as they are given, or with its own `kept` and those that it lacks.
+def with_body_of(nominal: Model, model: Model, kept: bool = False) -> Model:
+    """A path of a joint with the values of the body as its `nominal` path has them, or with its own `kept` and those that it lacks.
 
     Its inertia is that which the balance has subtracted from what the body asks for; it stays free where it is.
     """
-    nominal = balances.models[joint]
     inertia = replace(nominal.mass, fixed=model.mass.fixed)
     given, own = nominal.term(BODY), model.term(BODY)
     if given is None or own is None:
@@ -160,13 +159,10 @@ def _gain(
 
 def _moved(fitted: Fitted, nominal: Model, balance: Balance) -> Fitted:
     """A hypothesis about a joint, fitted again with other values of the body: those of a nominal path and its balance."""
-    body = nominal.term(BODY)
     model = fitted.fit.model
-    terms = tuple(body if body is not None and term.label == BODY else term for term in model.terms)
-    inertia = replace(nominal.mass, fixed=model.mass.fixed)
+    made = with_body_of(nominal, model)
     if not model.mass.fixed:
-        inertia = replace(inertia, value=max(model.mass.value, inertia.bounds[0]))
+        made = replace(made, mass=replace(made.mass, value=max(model.mass.value, made.mass.bounds[0])))
     names = [name for name in fitted.fit.names if name in model.parameters]
-    made = replace(model, mass=inertia, terms=terms)
     fit = fit_effort(balance, made, names, fitted.priors, alignment=fitted.fit.alignment)
     return Fitted.of(fitted.elements, fitted.kind, fit, fitted.priors)

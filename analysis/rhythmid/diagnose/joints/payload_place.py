@@ -98,7 +98,7 @@ def _fitted(
     for _ in range(ROUNDS):
         rows = []
         for joint in (one for one in found if f"{link}.{PAYLOAD}" in now.links(one)):
-            model = with_body_of(now, joint, paths[joint], kept=joint == shown_at)
+            model = with_body_of(now.models[joint], paths[joint], kept=joint == shown_at)
             held = model.with_parameters({label: now.models[joint].parameters[label]})
             rows.append(rows_of(now, joint, held, found[joint].late, link))
         value, std = _refined(rows, value, end)
