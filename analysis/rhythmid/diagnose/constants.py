@@ -67,7 +67,7 @@ MOVES = 0.5
 # joint probability from which names are stated
 STATED = 0.8
 # share of all that free maps and names together explain that the names must explain, for the names to be stated
-EXPLAINED = 0.8
+EXPLAINED_BY_NAMES = 0.8
 # the same share, from which the names explain the main part
 MAINLY = 0.5
 # chance that the catalogue holds the truth, as a function of the unexplained share of the explainable mismatch: one half at

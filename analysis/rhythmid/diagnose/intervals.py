@@ -39,7 +39,7 @@ WIDEST = 2.0**20  # largest distance at which the rise is sought [standard devia
 BEYOND = 30.0  # the same as a multiple of the parameter's value
 DESCENTS = 3  # largest number of descents to lower minima
 TIED = 0.5  # share of its variance that a machine parameter must have in common with an effect's parameter to be checked, too
-AGAIN = 6  # iterations of the other parameters at a moved one
+ITERATIONS = 6  # iterations of the other parameters at a moved one
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ def _again(fit: Fit, way: _Way, pool: ThreadPoolExecutor | None) -> tuple[float,
     steps, state_steps = fit.differences
     try:
         end = descend(
-            model, fit.run, others, fit.noise, fit.starts, AGAIN, pool,
+            model, fit.run, others, fit.noise, fit.starts, ITERATIONS, pool,
             differences=(np.delete(steps, way.place), state_steps),
         )  # fmt: skip
     except InputError:

@@ -27,9 +27,11 @@ from rhythmid.simulation.signal import spline, zero_order_hold
 Array = NDArray[np.float64]
 HIGHEST = 0.4  # of the sample rate
 LENGTH = 30.0  # periods of the dominant motion
-NONE = "none needed for these records; a larger and more varied excitation would exclude smaller effects"
+NONE_NEEDED = (
+    "none needed for these records; a larger and more varied excitation would exclude smaller effects"
+)
 MORE = "repeat the records with a larger and more varied excitation"
-NONE_FREE = (
+NONE_NEEDED_FREE = (
     "none needed for these records; releases from larger and smaller amplitudes would exclude smaller effects"
 )
 MORE_FREE = "repeat the records with releases from larger and smaller amplitudes"
@@ -163,7 +165,7 @@ def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, st
 def next_experiment(found: Search, rivals: Sequence[Trial], series: Sequence[Series], verdict: str) -> str:
     """One sentence: what to record next, and which question that decides."""
     best = found.best
-    none, more = (NONE_FREE, MORE_FREE) if scales(series, best.model).idle else (NONE, MORE)
+    none, more = (NONE_NEEDED_FREE, MORE_FREE) if scales(series, best.model).idle else (NONE_NEEDED, MORE)
     others = [t for t in rivals if t.key != best.key]
     if not others:
         others = [t for t in found.trials if t.key != best.key]
