@@ -136,6 +136,16 @@ def rounded(value: float, std: float | None) -> str:
     return f"{value if value else 0.0:.{max(places, 0)}f}"  # no minus zero
 
 
+def with_std(value: float, std: float | None) -> str:
+    """A value ± its standard deviation, plain text for a terminal; without one the value alone."""
+    return rounded(value, std) + ("" if std is None else f" ± {std:.2g}")
+
+
+def written_percent(share: float | None) -> str:
+    """A share in percent, plain text for a terminal; a dash where there is none."""
+    return NONE if share is None else f"{number(100.0 * share, 3)} %"
+
+
 def estimate(value: float | None, std: float | None, unit: str, factor: float = 1.0) -> str:
     """An estimate with its 95 % interval, both multiplied by `factor` to reach `unit`.
 

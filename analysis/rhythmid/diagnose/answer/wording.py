@@ -13,7 +13,7 @@ from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
-from rhythmid.report.quantity import in_words, number, rounded, with_written_unit
+from rhythmid.report.quantity import in_words, number, with_std, with_written_unit
 
 NOT_LOCATED = "not located"
 
@@ -184,7 +184,7 @@ def recalibrated(nominal: Model, fitted: Model, stds: Mapping[str, float]) -> tu
         least = max(CONTRADICTS * std, CONTRADICTS_LEAST * abs(value.value))
         if math.isfinite(std) and abs(new - value.value) > least:
             said.append(
-                f"{name}: {value.value:.6g} in the nominal model, {with_written_unit(f'{rounded(new, std)} ± {std:.2g}', value.unit)} in the "
+                f"{name}: {value.value:.6g} in the nominal model, {with_written_unit(with_std(new, std), value.unit)} in the "
                 "records"
             )
     return tuple(said)

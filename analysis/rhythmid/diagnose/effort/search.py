@@ -7,6 +7,7 @@ place: an addition replaces a related law instead of standing beside it.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -388,7 +389,7 @@ class _Search:
 
 def _worst(*shapes: Mapping[str, float]) -> dict[str, float]:
     """The smallest value of each statistic."""
-    return {name: min(one[name] for one in shapes if name in one) for name in set().union(*shapes)}
+    return {name: min(one[name] for one in shapes if name in one) for name in dict.fromkeys(chain(*shapes))}
 
 
 def _kind_of(elements: Sequence[str], model: Model) -> Kind:

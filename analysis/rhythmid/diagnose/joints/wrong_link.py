@@ -20,7 +20,7 @@ from rhythmid.diagnose.joints.payload_place import placed_payload
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
-from rhythmid.report.quantity import rounded
+from rhythmid.report.quantity import with_std
 
 AXES = ("x", "y", "z")
 
@@ -81,9 +81,7 @@ class WrongLink:
             ]
             if "x" in told:
                 places = ", ".join(f"{one:.3g}" for one in own.centre)
-                now = ", ".join(
-                    f"{rounded(one.value, one.std)} ± {one.std:.2g}" for one in (told[axis] for axis in AXES)
-                )
+                now = ", ".join(with_std(one.value, one.std) for one in (told[axis] for axis in AXES))
                 said.append(f"({places}) m in the nominal model, ({now}) m in the records")
             return f"{self.parameter}: {'; '.join(said)}"
         if self.together is not None:
@@ -91,7 +89,7 @@ class WrongLink:
             return f"mass of {links} together: {_change(self.together.given, self.together.mass)}"
         if kind not in self.told and MOMENT in self.told:
             moment = self.told[MOMENT]
-            return f"{link}.{MOMENT}: {rounded(moment.value, moment.std)} ± {moment.std:.2g} {moment.unit} in the records"
+            return f"{link}.{MOMENT}: {with_std(moment.value, moment.std)} {moment.unit} in the records"
         new = self.values[MASS if kind == PAYLOAD else kind]
         return (
             f"{self.parameter}: {_change(replace(new, value=machine.body.parameters[self.parameter]), new)}"
@@ -102,7 +100,7 @@ def _change(before: Estimate, after: Estimate) -> str:
     """A value of the nominal model and that of the records, in words."""
     return (
         f"{before.value:.4g} {after.unit} in the nominal model, "
-        f"{rounded(after.value, after.std)} ± {after.std:.2g} {after.unit} in the records"
+        f"{with_std(after.value, after.std)} {after.unit} in the records"
     )
 
 
