@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhythmid.deadline import time_is_up
-from rhythmid.diagnose.constants import EARLIEST, FOLLOWS, LATEST, NOT_HELD, NOT_HELD_LEAST, STANDS_IN
+from rhythmid.diagnose.constants import FOLLOWS, LATEST, NOT_HELD, NOT_HELD_LEAST, STANDS_IN
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.early_output import EARLIEST
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.record_scales import REST_LENGTH
@@ -120,9 +121,7 @@ def calibrate(
     if best is None or ((best.nrmse() > SETTLED or not best.converged) and not time_is_up()):
         try:
             again = estimate(_shooting_start(model, series, pool), series, pool=pool)
-            if best is None or sum(float(r @ r) for r in again.residuals) < sum(
-                float(r @ r) for r in best.residuals
-            ):
+            if best is None or again.sum_of_squares < best.sum_of_squares:
                 best = again
         except InputError as error:
             failure = failure or error

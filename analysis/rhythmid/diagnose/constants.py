@@ -118,9 +118,8 @@ BETTER_STEP, PATIENCE = 0.9, 2
 BETTER_TOGETHER = 0.6
 
 # --- what calibration may absorb ------------------------------------------------------------------------------------
-# [samples] how far the input delay may be negative, and the longest delay that counts as a nuisance. An input that is not held but
-# simulated as held comes out half a sample early. Every log may have a short delay; a longer one is a hypothesis of its own
-EARLIEST, LATEST = 1.5, 2.5
+# [samples] the longest delay that counts as a nuisance: every log may have a short delay; a longer one is a hypothesis of its own
+LATEST = 2.5
 # ratio to which a delay far from its start must lower the error; otherwise it is only a surrogate for missing physics
 STANDS_IN = 0.7
 # a negative delay shows an input that was not held if it exceeds this many standard deviations and this share of a sample

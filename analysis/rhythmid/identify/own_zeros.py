@@ -70,7 +70,7 @@ def with_own_zeros(joint: JointFit) -> tuple[JointFit, tuple[str, ...]]:
         again = estimate(fit.model.with_values(values), series, max_step=fit.run.max_step)
     except InputError:
         return kept
-    before, other, after = (sum(float(r @ r) for r in one.residuals) for one in (fit, again, free))
+    before, other, after = (one.sum_of_squares for one in (fit, again, free))
     before = min(before, other)
     if after > LEFT * before:
         return kept

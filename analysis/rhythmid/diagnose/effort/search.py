@@ -19,7 +19,6 @@ from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.effort.beyond_gain import beyond_gain, recorded_efforts
 from rhythmid.diagnose.effort.beyond_motion import beyond_motion
 from rhythmid.diagnose.effort.candidate import (
-    INPUT_DELAY,
     Screened,
     Start,
     extended,
@@ -34,7 +33,7 @@ from rhythmid.diagnose.effort.kin import at_values_of, contained, kin, shortlist
 from rhythmid.diagnose.effort.reference import Mapped, reference_of
 from rhythmid.diagnose.effort.scales import scales_at, scales_of
 from rhythmid.diagnose.evidence import Blocks, predict
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, special_case
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction, special_case
 from rhythmid.diagnose.rejections import Claim, keeps_shape, rejections_of, replaces
 from rhythmid.diagnose.shape import within_bounds
 from rhythmid.elements.catalogue import Catalogue
@@ -50,6 +49,7 @@ from rhythmid.identify.inverse_dynamics.estimate import (
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
+from rhythmid.simulation.transport import INPUT_DELAY
 from rhythmid.value import Prior
 
 Array = NDArray[np.float64]
@@ -125,7 +125,7 @@ def search_effort(
         if better is None:
             break
         chosen = better
-    made = predict([one.linearised for one in search.found], search.blocks, balance.record)
+    made = search.predicted(search.found)
     best = search.found[max(range(len(made)), key=lambda index: made[index].score)]
     for one in (chosen, best) if best is not chosen else (chosen,):
         search.reduce(one)
@@ -156,6 +156,10 @@ class _Search:
         """Hypotheses that were ruled out, one of each structure, unless another fit of that structure was kept."""
         kept = {one.key: one for one in self.ruled_out if not self._known(one)}
         return tuple(kept.values())
+
+    def predicted(self, hypotheses: Sequence[Fitted]) -> list[Prediction]:
+        """Predictions of these hypotheses on the same rows."""
+        return predict([one.linearised for one in hypotheses], self.blocks, self.balance.record)
 
     def cut_off(self, parent: Fitted) -> dict[str, str]:
         """What is not tried after the budget is spent: all candidates, or further effects beside those of the parent."""
@@ -212,9 +216,7 @@ class _Search:
 
         A simpler law may have ended in another minimum that fits as well but predicts worse.
         """
-        scores = [
-            one.score for one in predict([one.linearised for one in new], self.blocks, self.balance.record)
-        ]
+        scores = [one.score for one in self.predicted(new)]
         best = new[max(range(len(new)), key=scores.__getitem__)]
         found = list(new)
         for place, plain in enumerate(new):
@@ -223,9 +225,7 @@ class _Search:
                 aligned = self._aligned(plain.elements)
                 fit = self._fit(plain.elements, model, plain.priors, aligned, best.fit.alignment)
                 made = replace(fit, shape=_worst(plain.shape, fit.shape))
-                *_, again = predict(
-                    [one.linearised for one in (*new, made)], self.blocks, self.balance.record
-                )
+                again = self.predicted([*new, made])[-1]
                 found[place] = made if again.score > scores[place] else plain
         return found
 

@@ -122,16 +122,16 @@ def one_round(
 
     Otherwise a missing effect, such as a slow drift, would be taken for coloured noise, in later rounds as in the first.
     """
-    noise = noise_without(fit, _changes(fit, catalogue, pool), _filters(fit, pool))
+    noise = noise_without(fit, changes_at(fit, catalogue, pool), _filters(fit, pool))
     if fit.nrmse() > MISFIT and noise.is_structure:
         noise = NoiseModel(np.empty(0), noise.variance**0.5)
     give_back()
     fit = under(fit, noise, pool)
-    scores = score(fit, _changes(fit, catalogue, pool))
+    scores = score(fit, changes_at(fit, catalogue, pool))
     return Round(tuple(scores), p_value(scores), added, tuple(scored_in_windows(fit, catalogue, pool))), fit
 
 
-def _changes(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> Iterator[Change]:
+def changes_at(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> Iterator[Change]:
     """Changes of the output by all first guesses of the catalogue, linearised at the fit."""
     known = trajectories(fit)
     return changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
@@ -167,9 +167,9 @@ def scored_in_windows(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor |
     try:
         run = prepare_run(fit.model, cut, fit.run.max_step)
         local = minimise(fit.model, run, fit.names, _within(fit.noise, cut), None, 10, pool)
-        noise = _within(noise_without(local, _changes(local, catalogue, pool), _filters(local, pool)), cut)
+        noise = _within(noise_without(local, changes_at(local, catalogue, pool), _filters(local, pool)), cut)
         local = under(local, noise, pool)
-        return score(local, _changes(local, catalogue, pool))
+        return score(local, changes_at(local, catalogue, pool))
     except InputError:
         return []
 
