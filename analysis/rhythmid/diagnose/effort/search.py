@@ -157,8 +157,8 @@ class _Search:
         kept = {one.key: one for one in self.ruled_out if not self._known(one)}
         return tuple(kept.values())
 
-    def predicted(self, hypotheses: Sequence[Fitted]) -> list[Prediction]:
-        """Predictions of these hypotheses on the same rows."""
+    def predicted(self, hypotheses: Sequence[Fitted | Mapped]) -> list[Prediction]:
+        """Predictions of these hypotheses, or of free maps, on the same rows."""
         return predict([one.linearised for one in hypotheses], self.blocks, self.balance.record)
 
     def cut_off(self, parent: Fitted) -> dict[str, str]:
@@ -190,10 +190,7 @@ class _Search:
             return None
         new = self._nearer(new)
         self.found.extend(new)
-        fits = [one.linearised for one in (*new, parent, self.nominal)]
-        *others, before, start, free = predict(
-            [*fits, self.reference.linearised], self.blocks, self.balance.record
-        )
+        *others, before, start, free = self.predicted([*new, parent, self.nominal, self.reference])
         order = sorted(range(len(new)), key=lambda index: -others[index].score)
         best = order[0]
         claimed = [one.claimed(prediction) for one, prediction in zip(new, others)]

@@ -13,16 +13,14 @@ from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.joints.joint_case import JointResult
-from rhythmid.diagnose.joints.link_centre import NUMBERS, PLACES, Load, centre_instead, load_instead
+from rhythmid.diagnose.joints.link_centre import NUMBERS, PLACES, Load, refitted_link
 from rhythmid.diagnose.joints.link_evidence import shared_estimate
 from rhythmid.diagnose.joints.link_group import Together, masses_alike
-from rhythmid.diagnose.joints.payload_place import placed_payload
+from rhythmid.diagnose.joints.payload_place import AXES, placed_payload
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.report.quantity import with_std
-
-AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +118,9 @@ def wrong_link(
     if link in balances.machine.body.centres:
         return wrong
     corrected = JointBalances.of(wrong.put_right(balances.machine), records, balances)
-    centre = centre_instead(balances, records, found, link, corrected)
-    both = load_instead(balances, records, found, link, corrected)
+    centre, both = (
+        refitted_link(balances, records, found, link, corrected, centre_only) for centre_only in (True, False)
+    )
     # its ten numbers were fitted to these efforts: each one beyond those of the simpler cause has to be worth the odds
     price = decisive(1) * np.array([NUMBERS - 1, NUMBERS - PLACES])
     simpler = max(price[0], centre.weight + price[1] if centre.better else 0.0)
@@ -165,10 +164,7 @@ def _of_parameter(
 ) -> WrongLink:
     link, kind = split(parameter)
     if kind == PAYLOAD:
-        payload = placed_payload(balances, records, found, link, shown.joint)
-        values = {"mass": Estimate(payload.mass, payload.mass_std, "kg")}
-        for axis, place, std in zip(AXES, payload.place, payload.place_std, strict=True):
-            values[axis] = Estimate(float(place), float(std), "m")
+        values = placed_payload(balances, records, found, link, shown.joint)
         return WrongLink(parameter, values, shown, f"{BODY}.{parameter}")
     label, chosen = f"{BODY}.{parameter}", shown.result.chosen
     value = chosen.model.parameters[label]
