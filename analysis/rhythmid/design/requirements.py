@@ -34,9 +34,9 @@ class Requirements:
     rate
         Samples per second [Hz].
     harmonics
-        M: the responses at ω + mω_p, |m| ≤ M, must not coincide.
+        M: the responses at ω + mω_p, |m| ≤ M, must not coincide; 0 without forcing.
     forcing
-        Periodic force made on the robot.
+        Periodic force made on the robot. An amplitude of 0 with `harmonics` 0 means a machine without forcing.
     input_delay, measurement_delay
         Expected delays [s].
     longest_delay
@@ -77,6 +77,16 @@ class Requirements:
     seed: int = 0
     forcing_assumed: bool = False
 
+    @property
+    def forced(self) -> bool:
+        """Whether a forcing acts, so that the machine moves in a limit cycle."""
+        return self.forcing.amplitude != 0.0
+
+    @property
+    def grid(self) -> float:
+        """Frequency [Hz] an even number of whose periods is the period of a multisine: that of the forcing, or else half the rate."""
+        return self.forcing.frequency if self.forced else 0.5 * self.rate
+
     @classmethod
     def of(
         cls,
@@ -88,6 +98,7 @@ class Requirements:
         noise_std: float,
         *,
         forcing: Forcing | None = None,
+        unforced: bool = False,
         delays: tuple[float, float] | None = None,
         **further: Any,
     ) -> "Requirements":
@@ -101,7 +112,18 @@ class Requirements:
             The attributes of these names.
         delays
             Of command and measurement, as expected [s].
+        unforced
+            Whether no forcing acts on the machine.
+
+        Raises
+        ------
+        InputError
+            For a forcing of a machine that is said to have none.
         """
+        if unforced:
+            if forcing is not None or model.term("periodic_forcing") is not None:
+                raise InputError("--no-forcing contradicts the model's periodic_forcing or --forcing")
+            forcing, further = Forcing(0.0), {"harmonics": 0} | further
         late = transport_delays(model) if delays is None else delays
         return cls(
             duration, band, max_effort, envelope, noise_std, input_delay=late[0], measurement_delay=late[1],
@@ -130,11 +152,16 @@ class Requirements:
             raise InputError(
                 f"--max-distortion {self.max_distortion:g}: a share of the response greater than 0 is expected"
             )
-        if self.rate < 1 or self.harmonics < 1:
+        if self.rate < 1 or self.harmonics < (1 if self.forced else 0):
             raise InputError("--rate and --harmonics are whole numbers greater than 0")
-        if self.forcing.amplitude == 0.0 or not self.forcing.frequency > 0.0:
+        if not self.forced and self.harmonics > 0:
             raise InputError(
-                "without forcing there is no limit cycle to excite about; give --forcing AMPLITUDE FREQUENCY"
+                "without forcing there is no limit cycle to excite about; give --forcing AMPLITUDE FREQUENCY, or --no-forcing "
+                "for a machine that rests without a command"
+            )
+        if not self.forced and self.kind == "comb":
+            raise InputError(
+                "--kind comb shifts its chirps along the forcing; without forcing use --kind multisine"
             )
         for name, value in (("input", self.input_delay), ("measurement", self.measurement_delay)):
             if not 0.0 <= value <= self.longest_delay:
@@ -158,7 +185,7 @@ class Requirements:
             raise InputError(
                 f"--band up to {high:g} Hz aliases: at {self.rate} Hz nothing beyond {nyquist:g} Hz is sampled"
             )
-        top = high + self.harmonics * self.forcing.frequency
+        top = high + self.harmonics * self.grid
         if top >= nyquist:
             raise InputError(
                 f"sideband +{self.harmonics} of {high:g} Hz lies at {top:g} Hz and aliases: at {self.rate} Hz nothing beyond "
