@@ -5,7 +5,7 @@ elements that need a full simulation. Compiled once per element, for all models.
 """
 
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -207,6 +207,20 @@ def effect_along(
         max_step, out,
     )  # fmt: skip
     return out
+
+
+def past_modifiers(force: Array, model: Model, path: Path) -> Array:
+    """The part (n,) of a further leg force that reaches the mass: modifiers of the model, such as a loss of contact, act on it, too.
+
+    Exact for modifiers that are affine in the leg's force, to first order for others.
+    """
+    without, beside = path.leg, path.leg + force
+    for term in model.terms:
+        if term.element.slot == "force" and term.element.acts == "modifier":
+            without, beside = (
+                leg + effect_along(term.element, term.numbers, model, replace(path, leg=leg)) for leg in (without, beside)
+            )
+    return beside - without
 
 
 def load_along(model: Model, path: Path) -> Array:

@@ -15,10 +15,18 @@ from numpy.typing import NDArray
 
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.case import SEARCHED, Budget
-from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
+from rhythmid.diagnose.constants import PRACTICAL
 from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
-from rhythmid.diagnose.search.proposals import REFITTED, WORTH, better_of, from_given, proposals, refitted
+from rhythmid.diagnose.search.proposals import (
+    REFITTED,
+    WORTH,
+    better_of,
+    follows_all,
+    from_given,
+    proposals,
+    refitted,
+)
 from rhythmid.diagnose.search.refit import (
     fine_enough,
     near_under_noise,
@@ -244,7 +252,7 @@ def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
         task.tell(f"refitting with {', '.join(p.added[-1] for p in proposed)}")
         others, lost = run_trials(proposed, *begun, enough, tell=task.tell)
         found, failed = better_of([*found, *others]), failed + lost
-    if not state.best.added and task.nominal.nrmse() > FOLLOWS:
+    if not state.best.added and not follows_all(task.nominal):
         proposed = from_given(task.nominal, task.given, task.catalogue, here.chi2, task.pool)
         others, lost = run_trials(proposed, *begun, tell=task.tell)
         found, failed = better_of([*found, *others]), failed + lost

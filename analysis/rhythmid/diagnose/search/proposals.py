@@ -3,21 +3,29 @@
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.diagnose.constants import FOLLOWS
 from rhythmid.diagnose.search.round import Round, changes_at, distinct
 from rhythmid.diagnose.search.score_tests import p_value, score
 from rhythmid.diagnose.search.trial import Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
-from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.output_error import Fit, minimise, normalised_error
+from rhythmid.identify.series import Series
 from rhythmid.model import Model
 
+Array = NDArray[np.float64]
 # number of elements refitted because of their scores along the whole records, and in windows. In 90 cases of all machines of the
 # proof the right element, or a related law, was among the first four along the records or among the first three in windows
 REFITTED, LOCAL = 4, 3
 # difference of the information criterion below which two models are indistinguishable. A score is linear and a refit is not, so that
 # of elements with such close statistics any may be the missing one
 WORTH = 10.0
+LEAST_LEVEL = 1e-6  # smallest level of a residual relative to the largest, against division by zero
 MANY = 5  # guesses of one element from which more of them are tried, because its shape matters
 
 
@@ -56,18 +64,47 @@ def from_given(
 ) -> list[Proposal]:
     """Structures to refit from the given values of the nominal model.
 
-    Used where the refitted nominal model does not follow the machine. The refit has then biased its parameters to compensate for
-    the missing effect: the spring of a hopper that leaves the ground comes out far too soft and too long.
+    Used where the refitted nominal model does not follow the machine in every record. The refit has then biased its parameters to
+    compensate for the missing effect: the spring of a hopper that leaves the ground comes out far too soft and too long. Every
+    record counts alike here: otherwise the one with the largest motion, to whose mismatch a score is least linear, would decide.
     """
     values = {name: given.value(name) for name in nominal.names if name in given.parameters}
     model = nominal.model.with_values(values)
     try:
         fit = minimise(model, nominal.run, nominal.names, nominal.noise, nominal.starts, 0, pool)
+        run = replace(fit.run, series=levelled(fit))
+        fit = minimise(model, run, nominal.names, nominal.noise, fit.starts, 0, pool)
         changes = changes_at(fit, catalogue, pool)
     except InputError:
         return []
     scores = score(fit, changes)
     return proposals(model, Round(tuple(scores), p_value(scores)), REFITTED, chi2)[0]
+
+
+def follows_all(fit: Fit) -> bool:
+    """Whether the model follows the machine in every record."""
+    errors = [normalised_error(*zip(*some, strict=True)) for some in by_record(fit)]
+    return not any(error > FOLLOWS for error in errors)
+
+
+def levelled(fit: Fit) -> tuple[Series, ...]:
+    """The series of a fit with the size of each record's residual as the relative standard deviation of its noise."""
+    level: dict[str, float] = {}
+    for some in by_record(fit):
+        squares = np.concatenate([one.levelled(residual)[one.used] ** 2 for residual, one in some])
+        level |= dict.fromkeys((one.name for _, one in some), math.sqrt(float(np.mean(squares))))
+    top = max(level.values())
+    return tuple(
+        replace(one, spread=one.spread_of(slice(None)) * max(level[one.name] / top, LEAST_LEVEL)) for one in fit.run.series
+    )
+
+
+def by_record(fit: Fit) -> list[list[tuple[Array, Series]]]:
+    """Residuals and series of a fit, grouped by the record from which they are."""
+    found: dict[str, list[tuple[Array, Series]]] = {}
+    for residual, one in zip(fit.residuals, fit.run.series):
+        found.setdefault(one.record or one.name, []).append((residual, one))
+    return list(found.values())
 
 
 def better_of(trials: Sequence[Trial]) -> list[Trial]:

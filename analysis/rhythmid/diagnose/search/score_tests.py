@@ -33,7 +33,7 @@ from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.record_scales import scales
 from rhythmid.model import Model
 from rhythmid.parallel import each
-from rhythmid.simulation.effect import Path, effect_along
+from rhythmid.simulation.effect import Path, effect_along, past_modifiers
 from rhythmid.simulation.generated_source import DRIVES
 from rhythmid.simulation.signal import first_order_hold, is_held
 from rhythmid.simulation.transport import delayed_command, delays, physical_times
@@ -213,6 +213,8 @@ def change_of_output(
         elif element.acts != "body":
             path = known.legs[index]
         force = effect_along(element, values, model, path)
+        if element.slot == "force" and element.acts in ("leg", "transmission"):
+            force = past_modifiers(force, model, path)
         if not float(np.abs(force).max()) < DIVERGED:  # true for NaN, too
             return None
         change = response(known, index, force)
