@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import correlate1d
 from scipy.signal import lfilter, lfiltic
 
 Array = NDArray[np.float64]
@@ -67,6 +68,14 @@ class NoiseModel:
             found.append((a, std))
         return tuple(reversed(found))
 
+    @cached_property
+    def _whitens_beginning(self) -> Array:
+        """Lower triangular matrix (p, p) that whitens the first p samples."""
+        made = np.zeros((self.order, self.order))
+        for k, (predictor, std) in enumerate(self._beginnings):
+            made[k, : k + 1] = np.concatenate([-predictor[::-1], [1.0]]) / std
+        return made
+
     def whiten(self, samples: Array) -> Array:
         """Innovations in units of their standard deviations; (n,) or (n, q) of the same shape.
 
@@ -74,15 +83,14 @@ class NoiseModel:
         that of the exact likelihood, and every part of a stretch counts.
         """
         p, n = self.order, len(samples)
+        if p == 0:
+            return samples / self.std
         white = np.empty_like(samples, dtype=float)
-        for k, (predictor, std) in enumerate(self._beginnings[:n]):
-            white[k] = (samples[k] - predictor @ samples[:k][::-1]) / std
-        if n <= p:
-            return white
-        after = samples[p:].astype(float)
-        for lag, coefficient in enumerate(self.coefficients, start=1):
-            after -= coefficient * samples[p - lag : n - lag]
-        white[p:] = after / self.std
+        first = min(p, n)
+        white[:first] = self._whitens_beginning[:first, :first] @ samples[:first]
+        if n > p:
+            each = np.concatenate([-self.coefficients[::-1], [1.0]]) / self.std
+            white[p:] = correlate1d(samples, each, axis=0, mode="constant", origin=p - (p + 1) // 2)[p:]
         return white
 
     def colour(self, white: Array) -> Array:
