@@ -17,6 +17,8 @@ from rhythmid.diagnose.search.score_tests import (
     trajectories,
 )
 from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.multiple_shooting import windows
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import Series, prepare
 
@@ -75,6 +77,40 @@ def test_a_guess_brings_what_the_models_own_parameters_had_stood_in_for():
     assert best.start["mass"] == pytest.approx(0.2, rel=0.5)
     low = best.own(fit.model, 0.0)
     assert low["linear_spring.stiffness"] == fitted  # nothing of the effect moves nothing
+
+
+HOPS = """
+inertia: {mass: {value: 2.0, unit: kg, fixed: true}}
+force:
+  - gravity: {acceleration: {value: 9.81, unit: m/s^2, fixed: true}}
+  - linear_spring: {stiffness: {value: 1000, unit: N/m}, rest_length: {value: 0.3, unit: m}}
+  - viscous_damper: {damping: {value: 8, unit: N*s/m}}
+  - ground_contact_loss: {loss: {value: 1.0, fixed: true}}
+"""
+
+
+@pytest.mark.parametrize(("name", "size"), [("cubic_stiffness", 3e2), ("quadratic_drag", 0.02)])
+def test_a_leg_that_leaves_the_ground_has_no_effect_in_flight(name, size):
+    """The scored change is the simulated one, for a law of the leg and for one of the body."""
+    model = rh.Model.from_text(HOPS)
+    run = {
+        "excitation": {"type": "silence"},
+        "forcing": {"amplitude": 8.0, "frequency": 1.8},
+        "duration": 6.0,
+    }
+    record = rh.simulate(model, run).record
+    series = prepare([record])
+    assert np.max(record.output.value) > 0.32  # it leaves the ground
+    fit = estimate(model, windows(series, 0.5), max_step=2e-4)
+    element = load_catalogue()[name]
+    (parameter,) = (one.name for one in element.parameters if one.name == element.size)
+    (change,) = changes_of(trajectories(fit), [(element, {parameter: size})])
+    augmented = fit.model.with_element(element, {parameter: size})
+    simulated = prepare_run(augmented, fit.run.series, fit.run.max_step).outputs(augmented, fit.starts)
+    before = fit.run.outputs(fit.model, fit.starts)
+    assert simulated is not None and before is not None
+    moved = np.concatenate([one - other for one, other in zip(simulated, before)])
+    assert np.std(np.concatenate(change.outputs) - moved) < 0.1 * np.std(moved)
 
 
 def test_what_repeats_less_than_five_times_in_a_record_is_no_periodic_disturbance(scales):

@@ -130,6 +130,29 @@ def _within(
     return step, bool(np.all(blocked | ((step > least) & (step < most))))
 
 
+def restarted(
+    problem: Problem, model: Model, starts: Sequence[Array], residuals: Sequence[Array] | None
+) -> tuple[list[Array], list[Array] | None]:
+    """For each series the better of its start and the one that its first samples show, with the residuals.
+
+    A start that was fitted beside another model may lie behind a switch of the new one, such as a touch-down, which no descent passes.
+    """
+    shown = first_guess(model, problem.run)
+    others = problem.residuals(model, shown)
+    if others is None or residuals is None:
+        return (
+            (list(starts), None if residuals is None else list(residuals))
+            if others is None
+            else (shown, others)
+        )
+    both = [list(zip(starts, residuals, strict=True)), list(zip(shown, others, strict=True))]
+    best = [
+        min(two, key=lambda one: float(np.sum(problem.whitened(index, one[1]) ** 2)))
+        for index, two in enumerate(zip(*both, strict=True))
+    ]
+    return [start for start, _ in best], [left for _, left in best]
+
+
 @dataclass(frozen=True)
 class Descent:
     """End of a search for the best parameters: the content of a `Fit`, without the sensitivities there.
@@ -176,6 +199,8 @@ def descend(
     current: list[Array] = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]
     problem.learn_hidden(model, current)
     residuals = problem.residuals(model, current)
+    if starts is not None:
+        current, residuals = restarted(problem, model, current, residuals)
     cost = problem.cost(model, residuals, current)
     if residuals is None or not math.isfinite(cost):
         raise InputError(
@@ -186,7 +211,7 @@ def descend(
     else:
         steps, state_steps = differences
     held: Array = np.array([float(place in run.compiled.layout.memories) for place in range(run.states)])
-    damping, converged, searched = LEAST_DAMPING, False, not held.any()
+    damping, converged, searched = LEAST_DAMPING, False, False
     low: Array = np.array([model.parameters[name].bounds[0] for name in names])
     high: Array = np.array([model.parameters[name].bounds[1] for name in names])
     brink = [a + BRINK * (model.value(n) - a) if math.isfinite(a) else math.inf for n, a in zip(names, low)]
@@ -243,8 +268,11 @@ def descend(
                 break
         converged = converged or not (improved or cut)  # no direction lowers the cost further
         if converged and not searched:
-            searched, moved = True, sought(problem, model, current, states, state_steps)
-            trial_residuals = problem.residuals(model, moved)
+            if held.any():
+                searched, moved = True, sought(problem, model, current, states, state_steps)
+                trial_residuals = problem.residuals(model, moved)
+            else:
+                moved, trial_residuals = restarted(problem, model, current, residuals)
             trial_cost = problem.cost(model, trial_residuals, moved)
             if trial_cost < cost - enough:
                 current, cost, residuals, here, damping, converged = (

@@ -218,7 +218,8 @@ def past_modifiers(force: Array, model: Model, path: Path) -> Array:
     for term in model.terms:
         if term.element.slot == "force" and term.element.acts == "modifier":
             without, beside = (
-                leg + effect_along(term.element, term.numbers, model, replace(path, leg=leg)) for leg in (without, beside)
+                leg + effect_along(term.element, term.numbers, model, replace(path, leg=leg))
+                for leg in (without, beside)
             )
     return beside - without
 

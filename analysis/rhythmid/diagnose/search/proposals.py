@@ -95,7 +95,8 @@ def levelled(fit: Fit) -> tuple[Series, ...]:
         level |= dict.fromkeys((one.name for _, one in some), math.sqrt(float(np.mean(squares))))
     top = max(level.values())
     return tuple(
-        replace(one, spread=one.spread_of(slice(None)) * max(level[one.name] / top, LEAST_LEVEL)) for one in fit.run.series
+        replace(one, spread=one.spread_of(slice(None)) * max(level[one.name] / top, LEAST_LEVEL))
+        for one in fit.run.series
     )
 
 
