@@ -17,7 +17,7 @@ from rhythmid.diagnose.agreement import HOW, contradictions
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis, Untried
-from rhythmid.diagnose.baseline import causal, check_free
+from rhythmid.diagnose.baseline import check_free
 from rhythmid.diagnose.case import LEAST_CALIBRATION, SEARCHED, Budget, Case
 from rhythmid.diagnose.constants import DRIVES_IT, LEFT, QUASI_STATIC
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
@@ -28,6 +28,7 @@ from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.admissible import admissible
 from rhythmid.identify.declared import with_declared
 from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.inverse_dynamics.applicability import Applicability, applicable
@@ -319,7 +320,9 @@ def _answers(
             result = free_run(case, scoring)
             diagnosis = compose(case, result, given.notes)
             model = without_record_zero(without_free_maps(result.search.fit.model))
-            yield Answer(diagnosis, causal(model), result)
+            kept = admissible(model, case.nominal, result.search.fit.std)
+            told = [note for name, note in kept.moved.items() if name in case.nominal.parameters]
+            yield Answer(replace(diagnosis, notes=(*diagnosis.notes, *told)), kept.model, result)
 
     if first or not effort.applies:
         yield from by_motion(windows=True)

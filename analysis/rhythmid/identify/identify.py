@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.admissible import admissible
 from rhythmid.identify.caution import Caution, none_told, not_identified, other_unit
 from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.declared import own_model, with_declared
@@ -194,11 +195,13 @@ def identify(
     balanced = None if found.usable else effort_note(fitted, machine, found.quality["nrmse"])
     said = (*said, *(() if balanced is None else (balanced,)))
     notes = (*still, *(note for one in clean for note in one.notes), *drives, *cut, *said, *found.notes)
+    kept = admissible(found.model, machine, None if found.joint is None else found.joint.fit.std)
+    notes += kept.notes
     if not unseen:
-        return replace(found, notes=notes)
+        return replace(found, model=kept.model, notes=notes)
     tell("running the identified model over the held-out records")
-    held_out = held_out_runs(found.model, found.joint, fitted, unseen)
-    return replace(found, notes=(*notes, *held_out.notes), held_out=held_out)
+    seen = held_out_runs(found.model, found.joint, fitted, unseen)
+    return replace(found, model=kept.model, notes=(*notes, *seen.notes), held_out=seen)
 
 
 def _identified(
@@ -320,7 +323,7 @@ def _by_likelihood(
     """Parameters and delays by joint maximum likelihood; HTFs without a model; None where only these can be given, because a cycle of
     unknown forcing cannot be simulated."""
     records, paper = seen.records, seen.paper
-    unforced = paper and not any(pumping.active for pumping in seen.pumpings)
+    unforced = paper and not any(one.active for one in seen.pumpings)
     tell("fitting the model to all records at once")
     try:
         found = best_fit(records, seen.nominal)
@@ -393,7 +396,7 @@ def _open(delays: Delays, period: float) -> bool:
 
 
 def _harmonics(result: PaperResult, method: HtfMethod) -> HarmonicEstimates:
-    """Transfer functions of a record, from the spectra that the paper's method has already computed."""
+    """Transfer functions of a record, from the spectra of the paper's method."""
     if method == "regularised_least_squares":
         return smoothed(result.estimate)
     return harmonic_transfer_functions(result.spectra, result.fit.linearised.cycle.ring_down, method)
