@@ -162,6 +162,13 @@ def test_nothing_left_and_a_free_run_are_told_in_words():
     assert scoring_words(Scored("free_run", None, "the model follows")) == "in free run: the model follows"
 
 
+def test_an_error_of_averaged_samples_is_said_to_be_one():
+    lines = printed(replace(ANSWER, scoring=Scored("free_run", None, "it follows", 4))).splitlines()
+    errors = [line for line in lines if "NRMSE" in line]
+    assert len(errors) == 2
+    assert all("NRMSE (of means of 4 samples; single samples scatter more) 0.0" in line for line in errors)
+
+
 def test_the_nominal_model_alone_has_no_probability():
     alone = (explanation((), 0.0, 1.0, "nominal"), explanation(("inertia.mass",), 2.5, 0.0, "freed_value"))
     rows = [line for line in printed(replace(ANSWER, hypotheses=alone)).splitlines() if "│" in line]

@@ -95,7 +95,7 @@ def test_the_contract_s_keys_are_in_every_answer(key):
             },
         ),
         ("Rejection", {"hypothesis", "name", "statistic", "threshold", "reason"}),
-        ("Scored", {"kind", "bandwidth", "reason"}),
+        ("Scored", {"kind", "bandwidth", "reason", "averaged"}),
     ],
 )
 def test_the_parts_of_an_answer_have_the_contract_s_keys(kept, keys):

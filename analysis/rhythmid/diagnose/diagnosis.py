@@ -20,6 +20,7 @@ from rhythmid.diagnose.answer.result import Diagnosis, Untried
 from rhythmid.diagnose.baseline import check_free
 from rhythmid.diagnose.case import LEAST_CALIBRATION, SEARCHED, Budget, Case
 from rhythmid.diagnose.constants import DRIVES_IT, LEFT, QUASI_STATIC
+from rhythmid.diagnose.effort.found_delay import with_found_delay
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
 from rhythmid.diagnose.free_map import without_free_maps
@@ -344,7 +345,8 @@ def _answers(
 
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST_EFFECTS) -> Answer:
     result = effort_run(case, effort, most)
-    return Answer(compose_effort(case, result, notes), result.chosen.model, result)
+    model = with_found_delay(result.search.balance, result.chosen, case.nominal)
+    return Answer(compose_effort(case, result, notes), model, result)
 
 
 def _also_by_effort(case: Case, effort: Applicability, chosen: Answer) -> Answer:

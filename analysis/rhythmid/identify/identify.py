@@ -260,12 +260,8 @@ class _Seen:
         if isinstance(result, str):
             return Shown(None, False, missing or result, lacks or result)
         functions = None if missing else _harmonics(result, htf)
-        if (
-            functions is not None
-            and functions.method == "regularised_least_squares"
-            and htf == "auto"
-            and lacks
-        ):
+        by_paper = functions is not None and functions.method == "regularised_least_squares"
+        if by_paper and htf == "auto" and lacks:
             functions, missing = None, lacks  # equation (5) of the paper has the same conditions
         return Shown(functions, lacks is None, missing, lacks)
 
@@ -348,19 +344,19 @@ def _by_likelihood(
     series = fit.run.series
     told = are_told(fit.model, series, {name: (values[name].value, fit.std[name]) for name in own})
     parameters = {
-        name: Estimate(values[name].value, fit.std[name], values[name].unit)
-        if name in told
-        else Estimate(None, None, values[name].unit)
+        name: Estimate(
+            *((values[name].value, fit.std[name]) if name in told else (None, None)), values[name].unit
+        )
         for name in own
     }
     jitter = measurement_jitter(fit)
+    late_by = (None, None) if late is None else (late.std, late.uncertainty)
     quality = quality_of(fit.nrmse(), records, paper) | {
         "unexplained_response": joint.search.response,
-        "noise_std": math.sqrt(fit.noise.variance * fit.run.series[0].block),
+        "averaged": series[0].block,
+        "noise_std": math.sqrt(fit.noise.variance * series[0].block),
         "measurement_jitter": jitter.to_dict(),
-        "command_jitter": Estimate(None, None, "s").to_dict()
-        if late is None
-        else Estimate(late.std, late.uncertainty, "s").to_dict(),
+        "command_jitter": Estimate(*late_by, "s").to_dict(),
     }
     delays = delays_of(joint, forcing, offset, SOURCES.get(seen.source, "the forcing"))
     delays = of_told_sum(delays, fit.model, series)

@@ -186,3 +186,8 @@ def scaled(size: float, unit: str) -> tuple[float, str]:
         return 1.0, unit
     step, prefix = next(((s, p) for s, p in PREFIXES if size >= s), PREFIXES[-1])
     return 1.0 / step, f"{prefix}{unit}"
+
+
+def averaged_words(count: int) -> str:
+    """What an error refers to where `count` successive samples are averaged; nothing where single ones are compared."""
+    return f" (of means of {count} samples; single samples scatter more)" if count > 1 else ""

@@ -21,7 +21,13 @@ from rhythmid.diagnose.answer.result import (
     Untried,
 )
 from rhythmid.diagnose.answer.untold import without_untold
-from rhythmid.diagnose.answer.wording import freed_value, location_of, recalibrated, summary_of
+from rhythmid.diagnose.answer.wording import (
+    freed_value,
+    location_of,
+    recalibrated,
+    summary_of,
+    unstated_delay,
+)
 from rhythmid.diagnose.case import EXPLAINED, Case
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
@@ -37,6 +43,7 @@ from rhythmid.identify.series import Series
 from rhythmid.identify.zero_estimates import zeros_told
 from rhythmid.model import Model
 from rhythmid.record.record import Record
+from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 SHOWN = 8  # alternatives listed
@@ -121,11 +128,12 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
             if case.budget.passed(EXPLAINED)
             else next_experiment(found, rivals, series, decision.verdict)
         ),
-        scoring=Scored(result.scoring.kind, None, result.scoring.reason),
+        scoring=Scored(result.scoring.kind, None, result.scoring.reason, series[0].block),
         calibration=(
             *result.calibration.notes,
             *zeros_told(fit),
             *recalibrated(case.nominal, fit.model, {name: fit.std[name] for name in fit.names}),
+            *_delay_told(case.nominal, fit, result.selection.chosen.elements),
         ),
         excluded=tuple(Untried(" + ".join(added), why) for added, why in found.excluded),
         heldout=held_out_words(case.holdout, f"the last fifth of every {part}"),
@@ -139,6 +147,13 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         families=decision.families,
         assumptions=(ONE_CLOCK,) if any(one.commanded for one in series) else (),
     )
+
+
+def _delay_told(nominal: Model, fit: Fit, elements: Sequence[str]) -> tuple[str, ...]:
+    """The sentence about a delay that the nominal model does not have, where no hypothesis about it was chosen."""
+    if INPUT_DELAY in nominal.parameters or INPUT_DELAY in elements or INPUT_DELAY not in fit.names:
+        return ()
+    return unstated_delay(fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY])
 
 
 def _indistinguishable(model: Model, decision: Decision) -> tuple[tuple[str, ...], ...]:

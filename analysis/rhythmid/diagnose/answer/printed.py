@@ -9,7 +9,7 @@ from rich.markup import escape
 from rhythmid.diagnose.answer.result import Diagnosis, Explanation, Remainder, Scored
 from rhythmid.diagnose.rejections import Rejection
 from rhythmid.report.hypotheses import grouped, interchangeable, most_weighed
-from rhythmid.report.quantity import NONE, RARE, written_percent
+from rhythmid.report.quantity import NONE, RARE, averaged_words, written_percent
 from rhythmid.report.terminal_table import print_estimates, print_table
 
 HYPOTHESES_SHOWN = 6
@@ -50,7 +50,8 @@ def show(found: Diagnosis, console: Console) -> None:
         if name == "augmented" and fit == found.refitted_nominal:
             continue  # the same model as the refitted nominal one
         held = NONE if fit.heldout_nrmse is None else f"{fit.heldout_nrmse:.5f}"
-        lines.said(name.replace("_", " "), f"NRMSE {fit.train_nrmse:.5f} on fitted data, {held} held out")
+        of = averaged_words(found.scoring.averaged)
+        lines.said(name.replace("_", " "), f"NRMSE{of} {fit.train_nrmse:.5f} on fitted data, {held} held out")
     for label, group in (
         ("assumption", found.assumptions),
         ("calibration", found.calibration),

@@ -14,6 +14,7 @@ from rhythmid.diagnose.verdict import Decision
 from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
 from rhythmid.report.quantity import in_words, number, with_std, with_written_unit
+from rhythmid.simulation.transport import INPUT_DELAY
 
 NOT_LOCATED = "not located"
 
@@ -188,3 +189,12 @@ def recalibrated(nominal: Model, fitted: Model, stds: Mapping[str, float]) -> tu
                 "records"
             )
     return tuple(said)
+
+
+def unstated_delay(delay: float, std: float | None) -> tuple[str, ...]:
+    """A delay [s] that the records show and the nominal model does not have, as a sentence; none where noise may explain it."""
+    if std is None or not math.isfinite(std) or delay <= CONTRADICTS * std:
+        return ()
+    return (
+        f"{INPUT_DELAY}: none in the nominal model, {with_std(1e3 * delay, 1e3 * std)} ms in the records",
+    )

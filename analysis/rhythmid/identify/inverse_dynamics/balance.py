@@ -62,7 +62,7 @@ class Balance:
     measured : (n,) the recorded effort at the rows, filtered.
     stick_speed : speed below which samples are left out.
     stuck : share of the rows that were left out for this reason.
-    period : sample period [s] of the records, the unit of the alignment.
+    period : sample period [s] of motion or recorded effort, whichever is longer: the unit of the alignment.
     """
 
     motions: tuple[Motion, ...]
@@ -84,7 +84,8 @@ class Balance:
         else:
             raw, chosen = stretches(records, model, QUARTER / bandwidth.effort), bandwidth
         motions = [motion_of(one, model, chosen.motion, chosen.low) for one in raw]
-        return cls.of_motions(motions, chosen, max(one.period for one in raw))
+        efforts = [one.effort.period for one in records if one.effort is not None]
+        return cls.of_motions(motions, chosen, max([*efforts, *(one.period for one in raw)]))
 
     @classmethod
     def of_motions(
@@ -118,8 +119,7 @@ class Balance:
             tuple(motions), chosen, tuple(places), np.unique(numbers, return_inverse=True)[1].astype(np.int64),
             np.zeros(count), STICK * speed, 1.0 - count / max(all_rows, 1), period,
         )  # fmt: skip
-        measured = made.rows([one.effort for one in motions])
-        made.measured[:] = measured
+        made.measured[:] = made.rows([one.effort for one in motions])
         return made
 
     def rows(self, signals: Iterable[Array], shift: float = 0.0) -> Array:
