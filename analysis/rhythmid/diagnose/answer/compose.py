@@ -19,6 +19,7 @@ from rhythmid.diagnose.answer.result import (
     Remainder,
     Scored,
     Untried,
+    settled,
 )
 from rhythmid.diagnose.answer.untold import without_untold
 from rhythmid.diagnose.answer.wording import (
@@ -32,6 +33,7 @@ from rhythmid.diagnose.case import EXPLAINED, Case
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.identify.held_out_zeros import held_out_zero_notes
@@ -84,7 +86,9 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     missing = without_untold(missing, fit.model, scales(series, fit.model))
     plain = FitQuality(found.nominal.nrmse(), contest.nominal.heldout_nrmse)
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
-    rivals = [t for t in found.trials if len(t.added) == len(best.added) and t.bic() - best.bic() < RIVALS]
+    groups = _indistinguishable(found.fit.model, decision)
+    rivals = [one for one in found.trials if _rivals(one, best, groups)]
+    needed = decision.verdict != "consistent" and not settled(decision.verdict, groups)
     heldout = {one.key: one.heldout_nrmse for one in contest.hypotheses}
     alternatives = tuple(
         Alternative(
@@ -115,7 +119,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         location=location_of(found, missing, result.before, decision.verdict),
         missing=missing,
         joint_probability=decision.joint,
-        indistinguishable=_indistinguishable(found.fit.model, decision),
+        indistinguishable=groups,
         alternatives=alternatives,
         hypotheses=explanations(contest, decision),
         rejections=result.selection.rejections,
@@ -124,9 +128,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         parameters={name: estimated(fit, name) for name in fit.model.parameters},
         delays=delays_of(fit),
         next_experiment=(
-            MORE_TIME
-            if case.budget.passed(EXPLAINED)
-            else next_experiment(found, rivals, series, decision.verdict)
+            MORE_TIME if case.budget.passed(EXPLAINED) else next_experiment(found, rivals, series, needed)
         ),
         scoring=Scored(result.scoring.kind, None, result.scoring.reason, series[0].block),
         calibration=(
@@ -147,6 +149,14 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         families=decision.families,
         assumptions=(ONE_CLOCK,) if any(one.commanded for one in series) else (),
     )
+
+
+def _rivals(one: Trial, best: Trial, groups: Sequence[Sequence[str]]) -> bool:
+    """Whether the records do not tell a trial from the best one: by the information criterion or by the evidence."""
+    if len(one.added) == len(best.added) and one.bic() - best.bic() < RIVALS:
+        return True
+    names, own = ({t.element(label).name for label in t.added} for t in (one, best))
+    return names != own and any(names ^ own <= set(group) for group in groups)
 
 
 def _delay_told(nominal: Model, fit: Fit, elements: Sequence[str]) -> tuple[str, ...]:
