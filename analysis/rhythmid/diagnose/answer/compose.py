@@ -88,6 +88,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
     groups = _indistinguishable(found.fit.model, decision)
     rivals = [one for one in found.trials if _rivals(one, best, groups)]
+    case.tell("choosing the next experiment")
     needed = decision.verdict != "consistent" and not settled(decision.verdict, groups)
     heldout = {one.key: one.heldout_nrmse for one in contest.hypotheses}
     alternatives = tuple(
