@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from rhythmid.start.meaning import (
     is_lone_v,
     meaning_of,
     rotary_of,
+    rotary_of_wrench,
     says_who_asks,
 )
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along, runs_like_a_clock
@@ -313,10 +315,11 @@ def _degrees(ratio: float) -> str:
 def _rotary(choices: Mapping[str, Choice], output: Recorded, of_robot: bool, ask: Ask) -> tuple[bool, str]:
     """Whether the machine is rotational, by units and names; a joint of several, or of a JointState, is rotational
     by default."""
-    for choice in choices.values():
-        rotary, why = rotary_of(choice.recorded)
-        if rotary is not None:
-            return rotary, f"{choice.recorded}: {why}"
+    for judge in (partial(rotary_of, by_topic=False), rotary_of_wrench, rotary_of):
+        for choice in choices.values():
+            rotary, why = judge(choice.recorded)
+            if rotary is not None:
+                return rotary, f"{choice.recorded}: {why}"
     turns = of_robot or output.type == "sensor_msgs/msg/JointState"
     answers = ["it turns (rad, N m)", "it slides (m, N)"]
     number = ask("Does the joint turn or slide?", answers if turns else answers[::-1])
