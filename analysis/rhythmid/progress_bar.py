@@ -104,8 +104,8 @@ def progress(console: Console, budget: float | None = None, log: bool = True) ->
             console.print(f"[dim]{time.monotonic() - began:6.1f} s  {escape(what)}[/]")
 
     if not console.is_interactive:  # a bar would leave an empty line there
-        with _reminded(printed) if log else nullcontext(printed) as tell:
-            yield tell
+        with _reminded(printed) if log else nullcontext(printed) as told:
+            yield told
         return
     with Progress(*columns, console=console, transient=True, expand=True) as bar:
         task = bar.add_task("", total=None)

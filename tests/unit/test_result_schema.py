@@ -42,7 +42,7 @@ ANSWERED = Diagnosis(
     parameters={"linear_spring.stiffness": Estimate(200.0, 0.1, "N/m")},
     delays={"sum": {"value": 0.03, "std": None, "unit": "s"}, "separable": False},
     next_experiment="none",
-    scoring=Scored("effort", 12.0, "the effort was recorded"),
+    scoring=Scored("effort", 12.0, "the effort was recorded", 1),
 )
 
 

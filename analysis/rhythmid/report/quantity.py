@@ -189,5 +189,5 @@ def scaled(size: float, unit: str) -> tuple[float, str]:
 
 
 def averaged_words(count: int) -> str:
-    """What an error refers to where `count` successive samples are averaged; nothing where single ones are compared."""
-    return f" (of means of {count} samples; single samples scatter more)" if count > 1 else ""
+    """What an error refers to where `count` successive samples are averaged: single ones scatter more. Nothing where these are compared."""
+    return f" (of means of {count} samples)" if count > 1 else ""

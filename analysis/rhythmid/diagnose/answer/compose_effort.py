@@ -75,7 +75,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         next_experiment=_next_experiment(result),
         chosen=result.selection.chosen.elements,
         families=decision.families,
-        scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason),
+        scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason, 1),
         assumptions=(FIXED_SCALE, NO_SENSOR),
         calibration=(
             *recalibrated(case.nominal, chosen.fit.model, chosen.std()),

@@ -128,7 +128,7 @@ class Scored:
     kind: ScoringKind
     bandwidth: float | None
     reason: str
-    averaged: int = 1
+    averaged: int
 
 
 @dataclass(frozen=True)
