@@ -72,6 +72,19 @@ def test_a_delay_that_comes_out_negative_is_saved_as_zero_with_a_note():
     )
 
 
+def test_a_delay_that_scatters_about_zero_is_told_only_where_the_model_has_one():
+    early = OWN.with_parameters(
+        {"input_delay.delay": replace(OWN.parameters["input_delay.delay"], value=-1e-5)}
+    )
+    std = {"input_delay.delay": 1e-4}
+    assert (
+        admissible(early, AXIS, std).notes == ()
+        and admissible(early, AXIS, std).model.value("input_delay.delay") == 0.0
+    )
+    assert len(admissible(early, OWN, std).notes) == 1
+    assert len(admissible(early, AXIS, {"input_delay.delay": 1e-6}).notes) == 1
+
+
 def test_a_value_inside_its_bounds_is_saved_as_it_is():
     model = OWN.with_values({"input_delay.delay": 0.01})
     kept = admissible(replace(model), OWN)

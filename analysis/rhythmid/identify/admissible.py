@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 from rhythmid.model import MASS, Model
 from rhythmid.value import Value
 
+SCATTER = 2.0  # standard deviations by which a parameter that the file does not have may pass a bound without a word: it scatters
+
 
 @dataclass(frozen=True)
 class Admissible:
-    """The model, and one note for each value that was moved to a bound."""
+    """The model, and one note for each value that was moved to a bound by more than scatter, or that the file states."""
 
     model: Model
     moved: Mapping[str, str]
@@ -43,7 +45,8 @@ def admissible(model: Model, nominal: Model, std: Mapping[str, float] | None = N
         inside = min(max(value.value, low), high)
         prior = given[name].prior if name in given else None
         changes[name] = replace(value, value=inside, bounds=(low, high), prior=prior)
-        if inside != value.value:
+        spread = (std or {}).get(name, 0.0)
+        if inside != value.value and (name in given or abs(inside - value.value) > SCATTER * spread):
             moved[name] = _note(name, value, inside, (std or {}).get(name))
     return Admissible(model.with_parameters(changes), moved)
 
