@@ -22,7 +22,8 @@ from rhythmid.simulation.generated_source import OutputKind
 # Schröer, in: Robot Calibration, Chapman & Hall, 1993; M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 aim
 # below it)
 CONDITION = 100.0
-# least share of the effort's power that the motion explains; with less, this effort does not make the motion
+# least share of the effort's power that a free map of the motion explains in the band of the map; with less, this effort does not make
+# the motion
 EXPLAINED_BY_MOTION = 0.5
 # least variation of the effort relative to the inertial force: below it the machine swings freely, and the balance
 # is a small difference of two large terms (a resonance of 10 % damping is driven by a fifth of its inertial force)
@@ -81,10 +82,10 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
     reason = f"the effort is predicted below {chosen.effort:.3g} Hz, where the motion explains {chosen.explained:.0%} of it"
     reason = "; ".join(filter(None, (reason, told(balance.stuck))))
     applies = True
-    if chosen.explained < EXPLAINED_BY_MOTION:
+    if chosen.mapped < EXPLAINED_BY_MOTION:
         applies, reason = (
             False,
-            f"the motion explains no more than {chosen.explained:.0%} of the effort",
+            f"no map of the motion explains more than {chosen.mapped:.0%} of the effort",
         )
     elif (varies := float(np.std(balance.measured)) / size_of(balance)) < LEAST_VARIATION:
         applies, reason = (

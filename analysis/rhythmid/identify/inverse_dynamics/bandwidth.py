@@ -44,6 +44,7 @@ class Bandwidth:
     `explained` is the share of the effort's power below `effort` [Hz] that the motion explains, `dominant` [Hz] the
     motion's strongest frequency. Where an acceleration was measured, the motion is unknown below `low` [Hz].
     `left_out` is the share of the effort's power above `effort` that goes with the motion, up to `left_out_to` [Hz].
+    `mapped` is the share that a free map alone explains in the band that it explains: whether this effort makes the motion.
     """
 
     motion: float
@@ -53,6 +54,7 @@ class Bandwidth:
     low: float = 0.0
     left_out: float = 0.0
     left_out_to: float = 0.0
+    mapped: float = 1.0
 
 
 def bandwidth_of_motion(raw: Sequence[Stretch]) -> tuple[float, float]:
@@ -91,10 +93,13 @@ def bandwidth_of(raw: Sequence[Stretch], model: Model) -> Bandwidth:
 def bandwidth_below(motions: Sequence[Motion], motion: float, dominant: float, low: float = 0.0) -> Bandwidth:
     """The bandwidth within which the effort of these motions, known below `motion` [Hz], is explained."""
     lines = _lines(motions, motion / WIDER, low)
-    effort = _of_effort(motions, motion / WIDER, dominant, low, lines)
-    effort = max(effort, min(LOWEST * dominant, motion / WIDER))
-    explained = _explained(motions, effort, low, lines)
-    return Bandwidth(motion, effort, explained, dominant, low, *_left_out(motions, motion, effort))
+    least = min(LOWEST * dominant, motion / WIDER)
+    by_map, effort = (max(one, least) for one in _of_effort(motions, motion / WIDER, dominant, low, lines))
+    mapped, explained = _explained(motions, effort, low, lines)
+    if by_map != effort:
+        mapped, _ = _explained(motions, by_map, low, lines)
+    left_out = _left_out(motions, motion, effort)
+    return Bandwidth(motion, effort, explained, dominant, low, *left_out, mapped)
 
 
 def _of_motion(raw: Stretch) -> tuple[float, float]:
@@ -183,27 +188,33 @@ def _columns(free: FreeMap, motion: Motion, lines: Sequence[float]) -> Array:
 
 def _of_effort(
     motions: Sequence[Motion], most: float, dominant: float, low: float, lines: Sequence[float]
-) -> float:
-    """Frequency [Hz] up to which the motion explains more than half of the effort's power.
+) -> tuple[float, float]:
+    """Frequencies [Hz] up to which a free map alone, and the motion, explain more than half of the effort's power.
 
     In whole half-octaves. The band includes one that is not explained where those above it make up for it: a vibration with little power
     far above the motion, which happens to be explained, does not.
     """
     edges = most / np.sqrt(2.0) ** np.arange(64)
     edges = edges[edges >= dominant]
-    total, remains = np.zeros(max(len(edges) - 1, 0)), np.zeros(max(len(edges) - 1, 0))
+    count = max(len(edges) - 1, 0)
+    total, by_map, coherent = np.zeros(count), np.zeros(count), np.zeros(count)
     efforts, left = _residuals(motions, most, low, lines)
     for motion, effort, residual in zip(motions, efforts, left, strict=True):
         frequency, power, _ = _spectra(effort, motion, most)
         _, rest, linear = _spectra(residual, motion, most)
-        for index in range(len(total)):
+        for index in range(count):
             inside = (frequency <= edges[index]) & (frequency > edges[index + 1])
             total[index] += len(effort) * power[inside].sum()
-            remains[index] += len(effort) * (rest - linear)[inside].sum()
-    gained = np.cumsum((HALF * total - remains)[::-1])  # from the lowest half-octave on
-    if not len(gained) or gained.max() <= 0.0:
-        return float(edges[-1] if len(edges) else most)
-    return float(edges[len(gained) - 1 - int(np.argmax(gained))])
+            by_map[index] += len(effort) * rest[inside].sum()
+            coherent[index] += len(effort) * linear[inside].sum()
+
+    def highest(remains: Array) -> float:
+        gained = np.cumsum((HALF * total - remains)[::-1])  # from the lowest half-octave on
+        if not count or gained.max() <= 0.0:
+            return float(edges[-1] if len(edges) else most)
+        return float(edges[count - 1 - int(np.argmax(gained))])
+
+    return highest(by_map), highest(by_map - coherent)
 
 
 def _spectra(signal: Array, motion: Motion, frequency: float) -> tuple[Array, Array, Array]:
@@ -227,17 +238,21 @@ def _spectra(signal: Array, motion: Motion, frequency: float) -> tuple[Array, Ar
     return frequencies, power, np.maximum((averages * linear - power) / (averages - 1), 0.0)
 
 
-def _explained(motions: Sequence[Motion], frequency: float, low: float, lines: Sequence[float]) -> float:
-    """Share of the effort's power below the frequency that the motion explains."""
+def _explained(
+    motions: Sequence[Motion], frequency: float, low: float, lines: Sequence[float]
+) -> tuple[float, float]:
+    """Shares of the effort's power below the frequency that a free map alone, and the motion, explain."""
     efforts, left = _residuals(motions, frequency, low, lines)
     total = sum(float(np.sum((one - np.mean(one)) ** 2)) for one in efforts)
     if total <= 0.0:
-        return 0.0
-    remains = 0.0
+        return 0.0, 0.0
+    by_map, remains = 0.0, 0.0
     for motion, residual in zip(motions, left, strict=True):
         frequencies, _, linear = _spectra(residual, motion, frequency)
-        remains += max(float(residual @ residual) - len(residual) * frequencies[1] * float(linear.sum()), 0.0)
-    return float(1.0 - remains / total)
+        power = float(residual @ residual)
+        by_map += power
+        remains += max(power - len(residual) * float(frequencies[1]) * float(linear.sum()), 0.0)
+    return 1.0 - by_map / total, 1.0 - remains / total
 
 
 def _left_out(motions: Sequence[Motion], motion: float, effort: float) -> tuple[float, float]:
