@@ -25,6 +25,7 @@ from rhythmid.record.joined_stamps import stamp_pairs
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.message_types import typestore
 from rhythmid.record.other_lengths import length_notes, unequal_arrays
+from rhythmid.record.placeholder import placeholder_of
 from rhythmid.record.signals import Clock
 from rhythmid.record.stated_rate import stated_rate
 from rhythmid.record.table import SUFFIXES, WIDEST, Table, table_suffix
@@ -258,7 +259,9 @@ def _filled(fields: list[Recorded], columns: Columns, begin: int) -> Iterator[Re
     for one in fields:
         field = Field.parse(one.field)
         value = columns.values[field]
-        kept = np.isfinite(value)
+        kept, placeholder = np.isfinite(value), placeholder_of(value)
+        if placeholder is not None:
+            kept &= ~placeholder.where
         time = (columns.log_ns[kept] - begin) * 1e-9
         order = np.argsort(time, kind="stable")
         yield replace(one, time=time[order], value=value[kept][order], stamped=stamped)

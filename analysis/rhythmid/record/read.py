@@ -20,6 +20,7 @@ from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.held_command import with_held_commands, with_hold
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
+from rhythmid.record.placeholder import Placeholder, placeholder_of
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
 from rhythmid.record.record import FEWEST_COMMON_SAMPLES, Channel, Record
@@ -41,13 +42,15 @@ MOST_OF_FORMULA = 50_000_000  # samples of it, 400 MB: an hour at 100 Hz has 36 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of one channel as recorded: time [s] and value in the order of recording, and latency [s]."""
+    """Samples of one channel as recorded: time [s] and value in the order of recording, latency [s], messages without
+    it, and its placeholders, whose value is NaN."""
 
     source: Source
     time: NDArray[np.float64]
     value: NDArray[np.float64]
     lateness: NDArray[np.floating] | None = None
     missing: int = 0
+    placeholder: Placeholder | None = None
 
 
 def load_records(
@@ -169,7 +172,7 @@ def read_tables(signals: Signals) -> Record:
         stale |= old
         if merged[source.file] or is_sampled_rarely(value):  # its empty cells are no samples
             time, value = time[~np.isnan(value)], value[~np.isnan(value)]
-        made[role] = Samples(source, time, value)
+        made[role] = Samples(source, time, value, placeholder=table.placeholder(source.column))
     assert signals.path is not None
     name = table_name(signals.path)
     name = (
@@ -257,8 +260,12 @@ def _from_columns(
     assert stamp_ns is not None
     kept = ~missing
     lateness = np.asarray((found.log_ns - stamp_ns)[kept] * 1e-9) if stamped else None
-    value = _in_unit(found.values[source.field][kept], source)
-    return stamp_ns[kept], Samples(source, np.empty(0), value, lateness, int(missing.sum()))
+    recorded = found.values[source.field][kept]
+    placeholder = placeholder_of(recorded)
+    if placeholder is not None:
+        recorded = np.where(placeholder.where, np.nan, recorded)
+    value = _in_unit(recorded, source)
+    return stamp_ns[kept], Samples(source, np.empty(0), value, lateness, int(missing.sum()), placeholder)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # for numbers near the largest, and NaN of every kind
@@ -283,14 +290,20 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         conflicts = _conflicts(samples, time, value)
         absent = np.isnan(value)
         if absent.mean() > MOSTLY:
-            raise InputError(f"{label}: {int(absent.sum())} of {len(value)} samples are NaN or empty")
+            marked = (
+                ""
+                if samples.placeholder is None
+                else f", or {samples.placeholder.words} for nothing measured"
+            )
+            raise InputError(f"{label}: {int(absent.sum())} of {len(value)} samples are NaN or empty{marked}")
         if conflicts > AMBIGUOUS * len(samples.time):
             raise InputError(
                 f"{label}: {conflicts} of {len(samples.time)} samples have the time of another one with another value: "
                 f"two publishers, a clock set back or too coarse stamps; {mend}{_evenly(clocks[role])}"
             )
         judgement[role] = channel_quality(
-            str(samples.source), samples.time, samples.lateness, time, value, stamped and role == "output", samples.missing, conflicts
+            str(samples.source), samples.time, samples.lateness, time, value, stamped and role == "output", samples.missing, conflicts,
+            samples.placeholder,
         )  # fmt: skip
         if absent.any():
             time, value = time[~absent], value[~absent]
