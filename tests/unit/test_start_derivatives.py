@@ -35,18 +35,28 @@ def test_a_name_of_a_derivative_says_its_quantity(name, quantity):
     assert meaning_of(said(name)).quantity == quantity
 
 
-@pytest.mark.parametrize("name", ["sway_angle_third_derivative", "joint_jerk", "accel_dot", "motor_current_derivative"])
+@pytest.mark.parametrize(
+    "name", ["sway_angle_third_derivative", "joint_jerk", "accel_dot", "motor_current_derivative"]
+)
 def test_a_jerk_or_a_rate_of_an_effort_is_neither_motion_nor_drive(name):
     assert is_ignored(said(name))
 
 
 def test_plain_names_state_no_derivative():
-    assert not any(derivative_of(said(name)) for name in ("dist", "deriver_pos", "position", "d", "knee_second"))
+    assert not any(
+        derivative_of(said(name)) for name in ("dist", "deriver_pos", "position", "d", "knee_second")
+    )
     assert meaning_of(said("trolley_position_first_derivative")).joint == "trolley"
 
 
 def written(path, columns: dict[str, np.ndarray]):
-    np.savetxt(path, np.column_stack([TIME, *columns.values()]), delimiter=",", header=",".join(("time", *columns)), comments="")
+    np.savetxt(
+        path,
+        np.column_stack([TIME, *columns.values()]),
+        delimiter=",",
+        header=",".join(("time", *columns)),
+        comments="",
+    )
     return inventory(path)
 
 
@@ -65,7 +75,11 @@ def test_init_takes_the_moving_position_and_not_the_largest_derivative_of_anothe
     for _ in range(3):
         rates.append(np.gradient(rates[-1], TIME))
     names = ("sway_angle", *(f"sway_angle_{order}_derivative" for order in ("first", "second", "third")))
-    columns = {"pwm_trolley_motor": drive * 80.0, "trolley_position": 10.0 * position, **dict(zip(names, rates, strict=True))}
+    columns = {
+        "pwm_trolley_motor": drive * 80.0,
+        "trolley_position": 10.0 * position,
+        **dict(zip(names, rates, strict=True)),
+    }
     roles = guess_roles(written(tmp_path / "run.csv", columns))
     assert roles.choices["output"].recorded.column == "trolley_position"
     assert roles.choices["input"].recorded.column == "pwm_trolley_motor"

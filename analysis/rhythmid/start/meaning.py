@@ -31,7 +31,11 @@ WORDS: dict[Quantity, frozenset[str]] = {
         "moment iq drehmoment kraft strom spannung couple coppia fuerza forza forca corriente corrente courant tensione tensao".split()
     ),
 }  # fmt: skip
-MOTIONS: tuple[Quantity, ...] = ("position", "velocity", "acceleration")  # each the derivative of the one before
+MOTIONS: tuple[Quantity, ...] = (
+    "position",
+    "velocity",
+    "acceleration",
+)  # each the derivative of the one before
 DEVICES: dict[str, Quantity] = {
     "encoder": "position",
     "encoders": "position",
@@ -47,7 +51,9 @@ LETTERS: dict[str, Quantity] = {  # conventional meaning of a single letter, whe
     "u": "effort", "f": "effort", "i": "effort", "t": "effort",
 }  # fmt: skip
 # a name with a `d` before one of these is that of a derivative
-MOTION = WORDS["position"] | WORDS["velocity"] | {letter for letter, one in LETTERS.items() if one == "position"}
+MOTION = (
+    WORDS["position"] | WORDS["velocity"] | {letter for letter, one in LETTERS.items() if one == "position"}
+)
 COMMANDED = frozenset(
     "des desired cmd cmds command commands commanded ref refs reference references target targets goal goals setpoint setpoints sp set "
     "demand demands demanded excitation request requests requested soll sollwert consigne consigna referencia riferimento".split()
@@ -330,18 +336,18 @@ def derivative_of(one: Recorded) -> int:
     that a sensor measures."""
     near = words_of(one.said)
     order, _ = order_of(near, MOTION)
-    quantity = _plain_quantity(one, near, words_of(one.topic))[0]
-    return order + (MOTIONS.index(quantity) if order and quantity in MOTIONS else 0)
+    plain = _plain_quantity(one, near, words_of(one.topic))[0]
+    # theta_dot_vel says twice that it is a velocity
+    of_position = plain not in MOTIONS or not WORDS["position"].isdisjoint(near)
+    return order if not order or of_position else order + MOTIONS.index(plain)
 
 
 def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity | None, str, bool]:
-    order, word = order_of(near, MOTION)
-    quantity, reason, certain = _plain_quantity(one, near, far)
-    if not order or one.unit in BY_UNIT or quantity == "effort":
-        return quantity, reason, certain
-    whole = order + (MOTIONS.index(quantity) if quantity in MOTIONS else 0)
-    said = f"its name says {word!r}" if quantity is None else f"its name says {word!r} of a {quantity}"
-    return (MOTIONS[whole], said, True) if whole < len(MOTIONS) else (None, said, True)
+    plain, order = _plain_quantity(one, near, far), derivative_of(one)
+    if not order or one.unit in BY_UNIT or plain[0] == "effort":
+        return plain
+    said = f"its name says {order_of(near, MOTION)[1]!r}"
+    return MOTIONS[order] if order < len(MOTIONS) else None, said, True
 
 
 def _plain_quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity | None, str, bool]:
