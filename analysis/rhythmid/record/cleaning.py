@@ -106,7 +106,8 @@ def cleaned(record: Record) -> Cleaned:
             limits = f"{values} {channel.unit}".rstrip()
             if bad.mean() > MOSTLY:
                 raise InputError(
-                    f"{record.name}: {100 * bad.mean():.0f} % of the output is clipped at {limits}; choose a wider range of the sensor"
+                    f"{record.name}: {100 * bad.mean():.0f} % of the output is clipped at {limits} or rests there ({channel.source}); choose a "
+                    "wider range of the sensor, or another channel"
                 )
             bad = bad | np.append(bad[1:], False) | np.insert(bad[:-1], 0, False)
         found.append(LeftOut(reason, int(bad.sum()), total, float(channel.time[bad][0]), limits))

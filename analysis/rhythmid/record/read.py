@@ -24,6 +24,7 @@ from rhythmid.record.placeholder import Placeholder, placeholder_of
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
 from rhythmid.record.record import FEWEST_COMMON_SAMPLES, Channel, Record
+from rhythmid.record.sign_bit import signed
 from rhythmid.record.signals import Signals, Sinusoid, Source
 from rhythmid.record.stale_rows import without_stale_rows
 from rhythmid.record.standstill import is_driven
@@ -175,9 +176,8 @@ def read_tables(signals: Signals) -> Record:
         made[role] = Samples(source, time, value, placeholder=table.placeholder(source.column))
     assert signals.path is not None
     name = table_name(signals.path)
-    name = (
-        signals.path.resolve().parent.name if name == "signals" else name
-    )  # the folder's name is more specific
+    if name == "signals":  # the folder's name is more specific
+        name = signals.path.resolve().parent.name
     clocks = {(source.file, source.clock(signals.time)) for source in signals.channels.values()}
     first = min((float(samples.time.min()) for samples in made.values() if len(samples.time)), default=0.0)
     told = [note for table in tables.values() for note in table.notes]
@@ -260,18 +260,17 @@ def _from_columns(
     assert stamp_ns is not None
     kept = ~missing
     lateness = np.asarray((found.log_ns - stamp_ns)[kept] * 1e-9) if stamped else None
-    recorded = found.values[source.field][kept]
-    placeholder = placeholder_of(recorded)
-    if placeholder is not None:
-        recorded = np.where(placeholder.where, np.nan, recorded)
-    value = _in_unit(recorded, source)
+    value = found.values[source.field][kept]
+    if (placeholder := placeholder_of(value)) is not None:
+        value = np.where(placeholder.where, np.nan, value)
+    value = _in_unit(value, source)
     return stamp_ns[kept], Samples(source, np.empty(0), value, lateness, int(missing.sum()), placeholder)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # for numbers near the largest, and NaN of every kind
 def _in_unit(value: NDArray[np.float64], source: Source) -> NDArray[np.float64]:
     """Values (n,) in SI or model units. Impossible ones, as from damaged bytes, become infinite and are rejected."""
-    value = value * source.scale + source.offset
+    value = signed(value, source.sign_bit) * source.scale + source.offset
     return np.where(np.abs(value) > LARGEST, np.copysign(np.inf, value), value)
 
 

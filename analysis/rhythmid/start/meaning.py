@@ -42,9 +42,8 @@ DEVICES: dict[str, Quantity] = {
     "enc": "position",
     "load": "effort",  # of a load cell; the angle of a load is no effort
 }  # quantities measured by a device, where no word states the quantity
-GAUGES = frozenset(
-    "cell cells gauge gauges strain".split()
-)  # whose volts are those of a bridge, and no driving signal
+# whose volts are those of a bridge, and no driving signal
+GAUGES = frozenset("cell cells gauge gauges strain".split())
 PULSED = frozenset("servo servos esc throttle pulse pulses".split())  # sent as the width of a pulse
 LETTERS: dict[str, Quantity] = {  # conventional meaning of a single letter, where nothing else is stated
     "q": "position", "x": "position", "y": "position", "z": "position", "v": "velocity", "w": "velocity", "a": "acceleration",
@@ -62,9 +61,8 @@ COMMANDED_LETTERS = frozenset("u r".split())
 # a controller's output, for an effort; the short words for a force also denote a contact's or a centre's
 CONTROLLED = frozenset("controller control ctrl contr ctl".split())
 CONTROLLED_SHORT = frozenset("con ctr".split())
-COMMANDED_COLUMNS = frozenset(
-    "action actions".split()
-)  # commanded by a policy; in a topic it denotes a ROS action
+# commanded by a policy; in a topic it denotes a ROS action
+COMMANDED_COLUMNS = frozenset(["action", "actions"])
 MEASURED = frozenset(
     "meas measured sensed act actual state states observation feedback fb est estimated present real raw filt filtered smoothed response "
     "encoder encoders enc ist istwert mesure medido medida misurato".split()
@@ -193,13 +191,9 @@ def is_measured_effort(one: Recorded) -> bool:
 
 def is_ignored(one: Recorded) -> bool:
     """Whether its name says that it is neither a motion nor a driving signal."""
-    words = {*words_of(one.said), *words_of(one.topic)}
-    return bool(words & IGNORED) or derivative_of(one) >= len(MOTIONS) or _is_rate_of_effort(one)
-
-
-def _is_rate_of_effort(one: Recorded) -> bool:
     near = words_of(one.said)
-    return order_of(near, MOTION)[0] > 0 and _plain_quantity(one, near, [])[0] == "effort"
+    of_effort = _plain_quantity(one, near, [])[0] == "effort" and order_of(near, MOTION)[0] > 0
+    return bool({*near, *words_of(one.topic)} & IGNORED) or derivative_of(one) >= len(MOTIONS) or of_effort
 
 
 def is_counted(one: Recorded) -> bool:
