@@ -58,8 +58,7 @@ def load_records(
     paths: Iterable[str | Path], signals: Signals | str | Path | None = None, tell: Tell = silent
 ) -> list[Record]:
     """Read several records, with progress messages; see `read_record`."""
-    if isinstance(signals, (str, Path)):
-        signals = Signals.load(signals)
+    signals = Signals.load(signals) if isinstance(signals, (str, Path)) else signals
     given = list(paths)
     return list(counted((read_record(path, signals) for path in given), len(given), "records read", tell))
 
@@ -284,7 +283,8 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         label = f"{samples.source.place}{samples.source}"
         if len(samples.time) == 0:
             raise InputError(f"{label}: is empty")
-        kept = put_in_order(samples.time, label, mend)
+        column = samples.source.clock(signals.time).column
+        kept = put_in_order(samples.time, f"{label} (time: {column})" if column != "" else label, mend)
         time, value = samples.time[kept], samples.value[kept]
         conflicts = _conflicts(samples, time, value)
         absent = np.isnan(value)
