@@ -197,7 +197,10 @@ def _doubts_of_effort(effort: Family | None, others: Sequence[Family], command: 
         ]
     doubts: list[str] = []
     if still := [name for name, one in effort.members.items() if not np.any(one.value)]:
-        doubts.append(f"effort: that of {', '.join(still)} is always 0, as where no motor acts")
+        doubts.append(
+            f"effort: that of {', '.join(still)} is always 0, as where no motor acts; where one acts whose effort was not "
+            "recorded, nothing that is said of these joints holds"
+        )
     if not effort.first.unit and _is_current(effort):
         doubts.append(
             f"effort: {effort.pattern} is called a current; where it is in A, give it the torque or force of one ampere at each joint, such as  "
