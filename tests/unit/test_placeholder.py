@@ -5,7 +5,7 @@ import pytest
 
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.inventory import inventory
-from rhythmid.record.placeholder import is_code, placeholder_of
+from rhythmid.record.placeholder import is_code, placeholder_of, without_placeholders
 from rhythmid.record.read import read_record
 from rhythmid.record.signals import Signals
 
@@ -102,3 +102,10 @@ def test_a_guess_is_made_from_what_was_measured_alone(tmp_path):
         "tau": 1.0,
     }
     assert "off: never changes" in found.left_out
+
+
+def test_columns_of_an_array_have_their_own_placeholders_and_single_numbers_have_none():
+    array = np.column_stack([SWING, marked(9999.0, slice(5, 40))])
+    told, found = without_placeholders({"q": array, "dt": np.array(0.002), "mass": np.array([9999.0])})
+    assert list(found) == ["q[1]"] and found["q[1]"].count == 35
+    assert np.isnan(told["q"][5:40, 1]).all() and np.isfinite(told["q"][:, 0]).all() and told["dt"] == 0.002

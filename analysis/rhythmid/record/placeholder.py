@@ -92,7 +92,7 @@ def _without(name: str, array: Any, found: Mapping[str, Placeholder]) -> Any:
 
 def _vectors(name: str, array: Any) -> dict[str, NDArray[np.float64]]:
     """The columns of an array by name, `name[1]` where it has several; empty where it holds no numbers."""
-    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu" or array.size == 0:
+    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu" or array.size < 2:
         return {}
     if array.size == max(array.shape):
         return {name: array.reshape(-1).astype(np.float64)}
