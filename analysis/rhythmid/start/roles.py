@@ -29,7 +29,9 @@ from rhythmid.start.meaning import (
 )
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along, runs_like_a_clock
 from rhythmid.start.role_choice import Ask, Choice, Known, pick, ranked_by_worth
+from rhythmid.start.slopes import without_slopes
 from rhythmid.start.step_before import BEFORE, duty_before, gone_to_set_point, set_point_before, step_before
+from rhythmid.start.symbols import with_symbols
 from rhythmid.start.targets import with_targets
 from rhythmid.start.unnamed_joints import column_groups
 from rhythmid.start.unnamed_reference import with_reference
@@ -66,7 +68,7 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     known = [
         Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one) and not _is_clock(one)
     ]
-    known = _without_empty_letters(known)
+    known = without_slopes(with_symbols(_without_empty_letters(known)))
     everything = [*known, *(Known(one, meaning_of(one)) for one in found.constant)]
     known, resting = (with_targets(part, everything) for part in (known, everything[len(known) :]))
     if not known:
