@@ -12,7 +12,7 @@ differences into probabilities.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from rhythmid.diagnose.constants import (
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.varying_scale import block_densities
-from rhythmid.identify.student import autocorrelation_time, scale_of, weights_of
+from rhythmid.identify.student import autocorrelation_time, log_density, scale_of, weights_of
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -49,12 +49,14 @@ class Linearised:
     jacobian : (n, p) its derivatives with respect to the parameters.
     precision : (p,) inverse variance of each parameter's prior; 0 where it has none.
     departure : (p,) each parameter's value less its prior's mean.
+    rests : (r,) log odds of each rest of the machine, at most 0; see `odds_of_rests`.
     """
 
     residual: Array
     jacobian: Array
     precision: Array
     departure: Array
+    rests: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -131,12 +133,13 @@ class CrossValidated:
     """Prediction errors (n,), each of a fit that did not see the row, and the scale (b,) that the fit expected in each block.
 
     `penalty` is subtracted from the log density of every row that a fit sees. It is the cost of free initial states, which
-    cross-validation does not include.
+    cross-validation does not include. `rests` (r,) are log odds of rests, which no fit sees.
     """
 
     error: Array
     scale: Array
     penalty: float = 0.0
+    rests: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
@@ -167,7 +170,7 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
             spread = max(scale_of((residual + change)[seen]), blocks.least)
         error[out] += change[out]
         scale[blocks.fold == fold] = spread
-    return CrossValidated(error, scale)
+    return CrossValidated(error, scale, rests=fit.rests)
 
 
 def _unit_information(residual: Array, jacobian: Array, blocks: Blocks) -> Array:
@@ -192,7 +195,7 @@ def _normal_equations(jacobian: Array, weight: Array, residual: Array) -> tuple[
 def prediction(
     found: CrossValidated, blocks: Blocks, time: float, measured: Array | None = None
 ) -> Prediction:
-    """The blocks' log densities and squared errors.
+    """The blocks' log densities and squared errors. Each rest is one more block, without samples.
 
     `time` is the autocorrelation time [samples], the same for all hypotheses. `measured` (n,) are the errors in the unit of
     the measurement, where the scored ones are whitened.
@@ -201,7 +204,23 @@ def prediction(
     counts = blocks.sums(np.ones(len(found.error)))
     density = block_densities(blocks.split(found.error), found.scale, time, seen, blocks.least)
     error = found.error if measured is None else measured
-    return Prediction(density - found.penalty * counts * seen / time, blocks.sums(error**2), counts, ~seen)
+    none = np.zeros(len(found.rests))
+    return Prediction(
+        np.concatenate([density - found.penalty * counts * seen / time, found.rests]),
+        np.concatenate([blocks.sums(error**2), none]),
+        np.concatenate([counts, none]),
+        np.concatenate([~seen, none.astype(bool)]),
+    )
+
+
+def odds_of_rests(excess: Sequence[Array], scale: float) -> Array:
+    """Log odds (r,) of rests against one that the model balances, by efforts (n,) that it does not balance; at most 0.
+
+    `scale` is that of the model's errors. A rest counts as one sample, because effort and position hardly change in it. Its odds are limited
+    to `BLOCK_ODDS`: a brake or a hand that no model contains may hold the machine. A rest that the model balances says nothing for it.
+    """
+    lost = [float(np.mean(log_density(one, scale) - log_density(np.zeros(1), scale))) for one in excess]
+    return np.maximum(np.array(lost), -math.log(BLOCK_ODDS))
 
 
 def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[Prediction]:

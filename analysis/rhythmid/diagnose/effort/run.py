@@ -11,7 +11,7 @@ from rhythmid.diagnose.case import SEARCHED, Case
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT, UNNAMED_EFFORT
 from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
-from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.effort.fitted import Fitted, odds_at_rest
 from rhythmid.diagnose.effort.lasting_error import lasting_share
 from rhythmid.diagnose.effort.reference import (
     HISTORY,
@@ -34,7 +34,8 @@ from rhythmid.diagnose.evidence import (
     time_of_best,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
-from rhythmid.diagnose.model_uncertainty import covariance_between
+from rhythmid.diagnose.model_uncertainty import covariance_between, std_among
+from rhythmid.diagnose.probability import weights_of
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.size_error import size_errors
 from rhythmid.diagnose.verdict import Decision, decide
@@ -91,11 +92,16 @@ class _Rows:
         if mapped is None:
             fit = fitted.fit
             other = self.heldout.predicted(fit.model, fit.alignment) - self.heldout.measured
+            rests = odds_at_rest(fit, self.heldout)
         else:
             other = residual_with_map(self.heldout, fitted, mapped)
+            rests = np.zeros(len(self.heldout.rests.found))
         residual = np.concatenate([seen.residual, other])
         jacobian = np.vstack([seen.jacobian, np.zeros((len(other), seen.jacobian.shape[1]))])
-        return cross_validate(Linearised(residual, jacobian, seen.precision, seen.departure), self.blocks)
+        rests = np.concatenate([seen.rests, rests])
+        return cross_validate(
+            Linearised(residual, jacobian, seen.precision, seen.departure, rests), self.blocks
+        )
 
     @property
     def judged(self) -> NDArray[np.bool_]:
@@ -189,7 +195,9 @@ def effort_run(
         contest = replace(contest, structured_after=lasting)
     least = detectable(predicted[chosen.elements].error, time) / size
     robust = replace(chosen, fit=with_robust_std(chosen.fit, found.balance.record))
-    errors_of_sizes = size_errors(chosen.fit.model, chosen.elements, robust.std())
+    weights = weights_of(contest, selection)
+    among = std_among(robust.std(), selection.chosen, contest.hypotheses, weights)
+    errors_of_sizes = size_errors(chosen.fit.model, chosen.elements, among)
     return EffortResult(
         applicability,
         found,

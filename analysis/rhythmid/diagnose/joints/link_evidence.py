@@ -169,4 +169,4 @@ def _moved(fitted: Fitted, nominal: Model, balance: Balance) -> Fitted:
     names = [name for name in fitted.fit.names if name in model.parameters]
     made = replace(model, mass=inertia, terms=terms)
     fit = fit_effort(balance, made, names, fitted.priors, alignment=fitted.fit.alignment)
-    return Fitted.of(fitted.elements, fitted.kind, fit, fitted.priors)
+    return Fitted.of(fitted.elements, fitted.kind, fit, fitted.priors, balance)
