@@ -10,7 +10,8 @@ from axes import CATALOGUE, axis_model
 
 from rhythmid.diagnose.constants import BLOCK_ODDS
 from rhythmid.diagnose.effort.search import search_effort
-from rhythmid.diagnose.evidence import odds_of_rests, predict
+from rhythmid.diagnose.evidence import Blocks, odds_of_rests, predict, with_trusted_rests
+from rhythmid.diagnose.hypothesis import Prediction
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
@@ -123,3 +124,20 @@ def test_a_constant_force_that_a_controller_balances_at_rest_is_still_found():
     only = CATALOGUE.without(*(name for name in CATALOGUE if name not in three))
     found = search_effort(pair(friction=0.0, weight=-FRICTION, held=FRICTION), axis_model(), only)
     assert found.chosen.elements == ("constant_force",)
+
+
+def predicted(motion: list[float], rests: list[float]) -> Prediction:
+    count = np.concatenate([np.full(len(motion), 20.0), np.zeros(len(rests))])
+    return Prediction(np.array([*motion, *rests]), count, count)
+
+
+@pytest.mark.parametrize(("ahead", "counted"), [([0.5, -0.4] * 6, True), ([0.9, 0.7] * 6, False)])
+def test_rests_decide_only_where_the_motion_does_not(ahead, counted):
+    """If a hypothesis that would move the machine predicts the motion far better than any other, a brake may hold the machine."""
+    blocks = Blocks.of(np.zeros(150, dtype=np.int64))
+    ahead = ahead[: blocks.count]
+    moves, holds = predicted(ahead, [-3.0, -3.0]), predicted([0.0] * blocks.count, [0.0, 0.0])
+    free_map = predicted([5.0] * blocks.count, [math.nan] * 2)
+    first, second, third = with_trusted_rests([moves, holds, free_map], blocks)
+    assert first.log_density[blocks.count :].sum() == (-6.0 if counted else 0.0)
+    assert second.score == holds.score and third.score == 5.0 * blocks.count

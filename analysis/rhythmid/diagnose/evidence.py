@@ -12,7 +12,7 @@ differences into probabilities.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ from rhythmid.diagnose.constants import (
     BLOCKS_OF_A_RECORD,
     DRAWS,
     EFFECT_PRIOR,
+    EQUIVALENT,
+    FALSE_ALARM,
     FOLDS,
     REWEIGHTED,
     ROWS_OF_A_BLOCK,
@@ -49,7 +51,7 @@ class Linearised:
     jacobian : (n, p) its derivatives with respect to the parameters.
     precision : (p,) inverse variance of each parameter's prior; 0 where it has none.
     departure : (p,) each parameter's value less its prior's mean.
-    rests : (r,) log odds of each rest of the machine, at most 0; see `odds_of_rests`.
+    rests : (r,) log odds of each rest of the machine, at most 0; see `odds_of_rests`. Not numbers where they are unknown.
     """
 
     residual: Array
@@ -232,7 +234,32 @@ def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[P
     if not found:
         return []
     time = time_of_best(found, record)
-    return [prediction(one, blocks, time) for one in found]
+    return with_trusted_rests([prediction(one, blocks, time) for one in found], blocks)
+
+
+def with_trusted_rests(predictions: Sequence[Prediction], blocks: Blocks) -> list[Prediction]:
+    """Predictions in which rests count where they can be trusted, and otherwise say nothing.
+
+    All rests of a machine may have one cause that no model contains, such as a brake. They are trusted as long as a hypothesis that balances
+    them predicts the motion as well as any: the motion decides, and rests decide where it does not. For a free map, whose rests are
+    not numbers, they say nothing.
+    """
+    motion = np.array([one.log_density[: blocks.count] for one in predictions])
+    rests = np.array([one.log_density[blocks.count :].sum() for one in predictions])
+    known = np.flatnonzero(~np.isnan(rests))
+    trusted = False
+    if len(known) and rests[known].min() < 0.0:
+        score = motion[known].sum(axis=1)
+        balances = rests[known] >= rests[known].max() - EFFECT_PRIOR
+        best, other = known[np.argmax(score)], known[np.argmax(np.where(balances, score, -math.inf))]
+        gain, error = _summed(motion[best] - motion[other])
+        trusted = gain <= max(EQUIVALENT * error, -math.log(FALSE_ALARM))
+    return [
+        replace(
+            one, log_density=np.concatenate([own, np.nan_to_num(one.log_density[blocks.count :]) * trusted])
+        )
+        for one, own in zip(predictions, motion, strict=True)
+    ]
 
 
 def time_of_best(found: Sequence[CrossValidated], record: Whole) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from rhythmid.diagnose.evidence import (
     detectable,
     prediction,
     time_of_best,
+    with_trusted_rests,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.model_uncertainty import covariance_between, std_among
@@ -48,6 +50,7 @@ from rhythmid.identify.inverse_dynamics.free_map import FreeMap
 from rhythmid.identify.robust_covariance import root_weights, weighted, with_robust_std
 
 Array = NDArray[np.float64]
+K = TypeVar("K")
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +98,7 @@ class _Rows:
             rests = odds_at_rest(fit, self.heldout)
         else:
             other = residual_with_map(self.heldout, fitted, mapped)
-            rests = np.zeros(len(self.heldout.rests.found))
+            rests = np.full(len(self.heldout.rests.found), np.nan)
         residual = np.concatenate([seen.residual, other])
         jacobian = np.vstack([seen.jacobian, np.zeros((len(other), seen.jacobian.shape[1]))])
         rests = np.concatenate([seen.rests, rests])
@@ -166,26 +169,27 @@ def effort_run(
         mapped[left[0].quantity] = rows.predicted(found.chosen, coupled)
     time = time_of_best([*predicted.values(), *mapped.values()], rows.record)
 
-    def made(one: CrossValidated) -> Prediction:
-        return prediction(one, rows.blocks, time)
+    def made(found: Mapping[K, CrossValidated]) -> dict[K, Prediction]:
+        each = with_trusted_rests([prediction(one, rows.blocks, time) for one in found.values()], rows.blocks)
+        return dict(zip(found, each, strict=True))
 
+    weighed = made(ruled_out) | made(predicted)
     errors = {
         tuple(sorted(elements)): float(np.sqrt(np.mean(one.error[rows.judged] ** 2)))
         for elements, one in (ruled_out | predicted).items()
     }
 
-    def claimed(one: Fitted, errors_of: CrossValidated) -> Hypothesis:
-        return one.claimed(made(errors_of), errors[tuple(sorted(one.elements))] / size)
+    def claimed(one: Fitted) -> Hypothesis:
+        return one.claimed(weighed[one.elements], errors[tuple(sorted(one.elements))] / size)
 
-    maps = {quantity: made(one) for quantity, one in mapped.items()}
     contest = Contest(
-        tuple(claimed(one, predicted[one.elements]) for one in found.hypotheses),
-        maps,
+        tuple(claimed(one) for one in found.hypotheses),
+        made(mapped),
         places * found.candidates,
         size,
         PRACTICAL_EFFORT,
         UNNAMED_EFFORT,
-        tuple(claimed(one, ruled_out[one.elements]) for one in found.ruled_out),
+        tuple(claimed(one) for one in found.ruled_out),
         cut_short=found.cut_short,
     )
     selection = select(contest)

@@ -147,7 +147,7 @@ def _approaches(
         [np.linspace(1.0, share, COMES, endpoint=False), np.linspace(share, 0.0, STAYS, endpoint=False)]
     )
     period = TRAVELS * span / (speed * COMES * 0.5)
-    times: Array = time + period * np.arange(1 - len(size), 1)
+    times = np.asarray(time + period * np.arange(1 - len(size), 1), dtype=np.float64)
     still, none = np.full(len(size), place), np.zeros(len(size))
     return [
         Motion(
