@@ -13,6 +13,7 @@ from rhythmid.diagnose.effort.search import search_effort
 from rhythmid.diagnose.evidence import Blocks, odds_of_rests, predict, with_trusted_rests
 from rhythmid.diagnose.hypothesis import Prediction
 from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.rest_force import STATIC
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
@@ -61,7 +62,7 @@ def unbalanced(model: Model, **known: float) -> list[float]:
 
 def test_a_constant_force_is_not_balanced_at_rest_where_the_machine_is_free_to_yield():
     first, end, second, far_end = unbalanced(with_force("constant_force", force=-FRICTION))
-    assert [end, far_end] == pytest.approx([-FRICTION] * 2, abs=0.08)
+    assert [end, far_end] == pytest.approx([-FRICTION] * 2, abs=0.12)
     assert first == second == 0.0  # below the start it was never seen: a stop may hold it there
 
 
@@ -78,7 +79,8 @@ def test_friction_balances_efforts_within_it_and_no_others(name, values):
     model = with_force(name, **values)
     for held in (0.0, 0.7, -0.7):
         assert unbalanced(model, held=held) == pytest.approx([0.0] * 4, abs=0.02)
-    assert unbalanced(model, held=1.6)[:3] == pytest.approx([1.6 - FRICTION] * 3, abs=0.1)
+    assert unbalanced(model, held=1.4) == pytest.approx([0.0] * 4, abs=0.02)  # static friction is larger
+    assert unbalanced(model, held=2.0)[:3] == pytest.approx([2.0 - STATIC * FRICTION] * 3, abs=0.15)
 
 
 def test_a_dead_band_makes_no_force_of_an_effort_within_it():
@@ -89,7 +91,7 @@ def test_a_dead_band_makes_no_force_of_an_effort_within_it():
 
 def test_without_friction_the_effort_at_rest_must_be_the_required_one():
     assert unbalanced(axis_model(), held=0.0) == pytest.approx([0.0] * 4, abs=0.03)
-    assert unbalanced(axis_model(), held=0.7)[:3] == pytest.approx([0.7] * 3, abs=0.08)
+    assert unbalanced(axis_model(), held=0.7)[:3] == pytest.approx([0.7] * 3, abs=0.12)
 
 
 def test_rests_of_a_machine_on_a_moving_base_do_not_count():

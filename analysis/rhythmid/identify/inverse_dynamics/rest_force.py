@@ -31,6 +31,9 @@ COMES = 48  # samples in which a motion comes to rest
 TRAVELS = 2.0  # ranges of the motion that it travels meanwhile: further than any hysteresis that slides within the records
 STAYS = 16  # samples below the speed of rest after them
 MOST = 32  # rests that are evaluated: of more, as many that are spread evenly
+# ratio of static to sliding friction up to which a friction that is fitted to the motion counts as holding a rest (B. Armstrong-Hélouvry,
+# P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083: static friction exceeds the sliding one)
+STATIC = 2.0
 DRIVES = ("command", "actuator")  # slots that the effort passes, in this order
 TURNS = "transition"  # name of the speed within which the sign of a dry friction turns; it makes the law smooth, but no friction at rest smaller
 
@@ -113,11 +116,14 @@ class Rests:
         return found
 
     def _balanced(self, model: Model) -> list[tuple[float, float]]:
-        """Smallest and largest effort that a model balances at each rest."""
+        """Smallest and largest effort that a model balances at each rest, with a static friction larger than the sliding one."""
         assert self.approaches is not None
         ends = [one[-STAYS:] for one in self.approaches.required(model)]
         pairs = [np.concatenate(two) for two in zip(ends[::2], ends[1::2], strict=True)]
-        return [(float(one.min()), float(one.max())) for one in pairs]
+        half = [0.5 * (STATIC - 1.0) * float(np.ptp(one)) for one in pairs]
+        return [
+            (float(one.min()) - more, float(one.max()) + more) for one, more in zip(pairs, half, strict=True)
+        ]
 
     def _through(self, number: int, motor: Sequence[Term], model: Model) -> Array:
         """What elements without a past make of the effort (n,) of a rest, in their order."""
