@@ -171,6 +171,11 @@ def percent(ratio: float | None, half: float | None = None) -> str:
     return f"{number(100.0 * ratio, 3)}\u202f%"
 
 
+def remaining_error(error: float, scoring: str) -> str:
+    """The error of a model that lacks nothing, as a share of what is scored."""
+    return f"the model misses {number(100.0 * error, 2)} % of the {'effort' if scoring == 'effort' else 'motion'}"
+
+
 def probability(value: float | None) -> str:
     """A probability in percent. Evidence never gives exactly 0 or 1, so very small and very large probabilities are stated as bounds."""
     if value is None or math.isnan(value):

@@ -88,7 +88,9 @@ def summary_of(
         said = "Nothing of practical size is missing: with its parameters refitted, the nominal model explains the records"
         left = decision.unexplained
         if left.significant:
-            return f"{said} but for a small remainder that depends on {left.goes_with}."
+            error = plain.train_nrmse if plain.heldout_nrmse is None else plain.heldout_nrmse
+            small = f"{number(100.0 * error, 2)} % of the {whole}"
+            return f"{said} but for {small}, part of which depends on {left.goes_with}."
         return f"{said} down to the noise."
     if decision.verdict == "missing_physics":
         said = f"The model lacks {names}."
