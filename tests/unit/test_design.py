@@ -286,3 +286,17 @@ def test_a_parameter_that_the_design_cannot_determine_is_named():
 def test_a_cycle_that_is_not_damped_is_refused():
     with pytest.raises(InputError, match="limit cycle"):
         design(hopper().with_values({"switched_damper.stance": 0.0}), WANTED)
+
+
+def test_no_forcing_is_assumed_for_a_machine_that_is_not_in_newtons_and_metres():
+    servo = Model.from_text(
+        """
+units: {force: N*m, position: rad}
+inertia: {mass: 0.5}
+force:
+  - linear_spring: {stiffness: 5.0, rest_length: 0.0}
+  - viscous_damper: {damping: 0.3}
+"""
+    )
+    wanted = Requirements.of(servo, 20.0, (0.2, 6.0), 2.0, (-0.5, 0.5), 1e-5)
+    assert not wanted.forced and not wanted.forcing_assumed and wanted.harmonics == 0

@@ -95,7 +95,7 @@ class Design(Result):
         if self.requirements.forcing_assumed:
             forcing = self.requirements.forcing
             found.append(
-                f"the model has no forcing: one of {forcing.amplitude:g} {self.experiment.model.units.force} at {forcing.frequency:g} Hz is "
+                f"the model has no forcing: one of {forcing.amplitude:g} N at {forcing.frequency:g} Hz is "
                 "assumed and part of the plan. The prediction, that of the two delays above all, holds only if it acts during the run; "
                 "state it with --forcing, or --no-forcing where there is none"
             )

@@ -8,6 +8,7 @@ from rhythmid.errors import InputError
 from rhythmid.ltp.htf import transport_delays
 from rhythmid.model import Model
 from rhythmid.settings import Forcing
+from rhythmid.unstated_forcing import NO_FORCING, forcing_of
 
 Kind = Literal["comb", "multisine"]
 KINDS: tuple[Kind, ...] = ("comb", "multisine")
@@ -50,7 +51,7 @@ class Requirements:
     seed
         Seed of the random phases.
     forcing_assumed
-        Whether neither the model nor the user states the forcing.
+        Whether neither the model nor the user states the forcing, and one acts.
 
     Raises
     ------
@@ -104,6 +105,8 @@ class Requirements:
     ) -> "Requirements":
         """Requirements whose forcing and delays are the model's own where they are not given.
 
+        Where neither states a forcing, 1 N at 1 Hz is assumed for a machine in N and m, and none for any other.
+
         Parameters
         ----------
         model
@@ -120,15 +123,19 @@ class Requirements:
         InputError
             For a forcing of a machine that is said to have none.
         """
+        own, assumed = forcing_of(model)
         if unforced:
             if forcing is not None or model.term("periodic_forcing") is not None:
                 raise InputError("--no-forcing contradicts the model's periodic_forcing or --forcing")
-            forcing, further = Forcing(0.0), {"harmonics": 0} | further
+            forcing = NO_FORCING
+        assumed = assumed and forcing is None
+        unforced = unforced or (forcing is None and own == NO_FORCING)
+        if unforced:
+            further = {"harmonics": 0} | further
         late = transport_delays(model) if delays is None else delays
         return cls(
             duration, band, max_effort, envelope, noise_std, input_delay=late[0], measurement_delay=late[1],
-            forcing=forcing_of(model) if forcing is None else forcing,
-            forcing_assumed=forcing is None and model.term("periodic_forcing") is None, **further,
+            forcing=own if forcing is None else forcing, forcing_assumed=assumed, **further,
         )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -191,9 +198,3 @@ class Requirements:
                 f"sideband +{self.harmonics} of {high:g} Hz lies at {top:g} Hz and aliases: at {self.rate} Hz nothing beyond "
                 f"{nyquist:g} Hz is sampled; lower --band or --harmonics, or raise --rate"
             )
-
-
-def forcing_of(model: Model) -> Forcing:
-    """The model's own forcing where it has one, else the paper's."""
-    term = model.term("periodic_forcing")
-    return Forcing() if term is None else Forcing(**term.numbers)

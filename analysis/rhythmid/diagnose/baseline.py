@@ -71,16 +71,6 @@ def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) ->
     return model.with_parameters({INPUT_DELAY: nuisance})
 
 
-def causal(model: Model) -> Model:
-    """The model with a slightly negative delay set to zero: a causal machine does not respond before the command."""
-    current = model.parameters.get(INPUT_DELAY)
-    if current is None or current.bounds[0] >= 0.0:
-        return model
-    return model.with_parameters(
-        {INPUT_DELAY: replace(current, value=max(current.value, 0.0), bounds=(0.0, current.bounds[1]))}
-    )
-
-
 def _shooting_start(model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Model:
     """Start values from short windows with initial states of their own, in which wrong values cannot drift far."""
     length = 2.0 / max(dominant_frequency(one) for one in series)

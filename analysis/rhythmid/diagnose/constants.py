@@ -98,7 +98,8 @@ BLIND = 0.2
 SHOWS = 4.0
 
 # --- how records are scored -----------------------------------------------------------------------------------------
-# share of the effort that models of real machines leave; up to it no other scoring mode is tried (measured: 2 to 5 %, see `PRACTICAL`)
+# share of the effort that models of real machines leave; up to it no other scoring mode is tried, unless something is left without a
+# name or a band was not compared (measured: 2 to 5 %, see `PRACTICAL`)
 LEFT = 0.05
 # ratio of effort to inertial force from which effort is scored before windows: the effort moves the machine against other
 # forces. With a smaller effort the machine swings by itself, and the effort shows little of the other forces

@@ -1,5 +1,6 @@
 """Diagnosis in free run or in windows: the search, the contenders and their evidence, and the fit behind the answer."""
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -28,7 +29,8 @@ from rhythmid.diagnose.free_functions import motion_maps
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.diagnose.intervals import profiled
 from rhythmid.diagnose.location import Dependence, dependences
-from rhythmid.diagnose.model_uncertainty import covariance_between
+from rhythmid.diagnose.model_uncertainty import covariance_between, std_among
+from rhythmid.diagnose.probability import weights_of
 from rhythmid.diagnose.refitted_map import refitted_map
 from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import Search, search
@@ -131,12 +133,15 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
             found = _weighed(found, [one for one, _ in others], more)
         contenders += more
     case.tell("locating what is left")
+    began = time.monotonic()
     after = dependences(run, rows, case.pool)
+    took = time.monotonic() - began
     refitted = None
     before = after
-    if trial.added and case.budget.passed(WEIGHED):
+    if trial.added and not case.budget.allows(took, WEIGHED):
         before, found = [], _untried(found, BEFORE)
     elif trial.added:
+        case.tell("finding what the mismatch of the nominal model depends on")
         nominal_run = trajectories(found.nominal)
         before = dependences(nominal_run, rows, case.pool)
         if not case.budget.spent:
@@ -157,19 +162,25 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     found = _with_best(found, trial, case)
     least = _detectable(contenders, selection.chosen, rows)
     if trial.added and selection.chosen.kind == "effects":
-        found = _told(_followed(found, case), INTERVALS)
+        late = case.budget.passed(EXPLAINED)
+        found = _untried(found, INTERVALS) if late else _told(_followed(found, case), INTERVALS)
     found = replace(found, excluded=(*found.excluded, *_unconverged(calibration.fit, found)))
     between = covariance_between(found.fit.names, selection.chosen, contest.hypotheses)
     unnamed = np.zeros((len(found.fit.names),) * 2)
     if case.budget.passed(EXPLAINED):
         found = _untried(found, SMALL_EFFECTS)
     else:
+        case.tell("adding to the standard deviations what small effects may change")
         unnamed = _unnamed(found, known, case)
     shown = unseen
     if unseen and case.budget.passed(EXPLAINED):
         shown, found = (), _untried(found, RERUN)
     fit = with_robust_covariance(found.fit)
-    errors = size_errors(fit.model, selection.chosen.elements, fit.std)
+    weights = weights_of(contest, selection)
+    among = std_among(fit.std, selection.chosen, contest.hypotheses, weights)
+    errors = size_errors(fit.model, selection.chosen.elements, among)
+    if shown:
+        case.tell("running both models over the held-out records")
     found = replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed))
     nominal_there, chosen_there = (
         rerun(one.model, shown, found.noise, one.run.max_step) for one in (found.nominal, found.fit)

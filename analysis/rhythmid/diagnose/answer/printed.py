@@ -6,10 +6,10 @@ from dataclasses import asdict
 from rich.console import Console
 from rich.markup import escape
 
-from rhythmid.diagnose.answer.result import Diagnosis, Explanation, Remainder, Scored
+from rhythmid.diagnose.answer.result import Diagnosis, Explanation, Scored
 from rhythmid.diagnose.rejections import Rejection
 from rhythmid.report.hypotheses import grouped, interchangeable, most_weighed
-from rhythmid.report.quantity import NONE, RARE, written_percent
+from rhythmid.report.quantity import NONE, RARE, averaged_words, remaining_error, written_percent
 from rhythmid.report.terminal_table import print_estimates, print_table
 
 HYPOTHESES_SHOWN = 6
@@ -44,13 +44,14 @@ def show(found: Diagnosis, console: Console) -> None:
         lines.said("indistinguishable here", ", ".join(group))
     if len(found.hypotheses) > 1:
         _print_hypotheses(found, console)
-    lines.said("left", remainder_words(found.remainder))
+    lines.said("left", remainder_words(found))
     lines.said("scored", scoring_words(found.scoring))
     for name, fit in found.fit.items():
         if name == "augmented" and fit == found.refitted_nominal:
             continue  # the same model as the refitted nominal one
         held = NONE if fit.heldout_nrmse is None else f"{fit.heldout_nrmse:.5f}"
-        lines.said(name.replace("_", " "), f"NRMSE {fit.train_nrmse:.5f} on fitted data, {held} held out")
+        of = averaged_words(found.scoring.averaged)
+        lines.said(name.replace("_", " "), f"NRMSE{of} {fit.train_nrmse:.5f} on fitted data, {held} held out")
     for label, group in (
         ("assumption", found.assumptions),
         ("calibration", found.calibration),
@@ -107,10 +108,15 @@ def _is_chosen(found: Diagnosis, one: Explanation) -> bool:
     return sorted(one.elements) == sorted(found.chosen)
 
 
-def remainder_words(left: Remainder) -> str:
-    """The remainder that the named effects leave, in words."""
+def remainder_words(found: Diagnosis) -> str:
+    """The remainder in words: as a share of the mismatch; where nothing is missing there is no mismatch, and it is told by the error."""
+    left = found.remainder
     if not left.significant:
         return "nothing that any free function predicts better than chance"
+    if found.verdict == "consistent":
+        fit = found.refitted_nominal
+        error = fit.train_nrmse if fit.heldout_nrmse is None else fit.heldout_nrmse
+        return f"{remaining_error(error, found.scoring.kind)}, part of which depends on {left.goes_with}"
     return f"{written_percent(left.share)} of the mismatch, which depends on {left.goes_with}"
 
 

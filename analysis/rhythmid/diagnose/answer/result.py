@@ -119,11 +119,16 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Scored:
-    """How records were scored: in free run, in windows or by effort; the bandwidth [Hz] of effort scoring; the reason."""
+    """How records were scored: in free run, in windows or by effort; the bandwidth [Hz] of effort scoring; the reason.
+
+    `averaged` successive samples of the motion count as one, their mean. All errors refer to these means, in which the noise is
+    smaller than in single samples.
+    """
 
     kind: ScoringKind
     bandwidth: float | None
     reason: str
+    averaged: int
 
 
 @dataclass(frozen=True)

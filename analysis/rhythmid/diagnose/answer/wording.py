@@ -14,6 +14,7 @@ from rhythmid.diagnose.verdict import Decision
 from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
 from rhythmid.report.quantity import in_words, number, with_std, with_written_unit
+from rhythmid.simulation.transport import INPUT_DELAY
 
 NOT_LOCATED = "not located"
 
@@ -87,7 +88,9 @@ def summary_of(
         said = "Nothing of practical size is missing: with its parameters refitted, the nominal model explains the records"
         left = decision.unexplained
         if left.significant:
-            return f"{said} but for a small remainder that depends on {left.goes_with}."
+            error = plain.train_nrmse if plain.heldout_nrmse is None else plain.heldout_nrmse
+            small = f"{number(100.0 * error, 2)} % of the {whole}"
+            return f"{said} but for {small}, part of which depends on {left.goes_with}."
         return f"{said} down to the noise."
     if decision.verdict == "missing_physics":
         said = f"The model lacks {names}."
@@ -188,3 +191,12 @@ def recalibrated(nominal: Model, fitted: Model, stds: Mapping[str, float]) -> tu
                 "records"
             )
     return tuple(said)
+
+
+def unstated_delay(delay: float, std: float | None) -> tuple[str, ...]:
+    """A delay [s] that the records show and the nominal model does not have, as a sentence; none where noise may explain it."""
+    if std is None or not math.isfinite(std) or delay <= CONTRADICTS * std:
+        return ()
+    return (
+        f"{INPUT_DELAY}: none in the nominal model, {with_std(1e3 * delay, 1e3 * std)} ms in the records",
+    )

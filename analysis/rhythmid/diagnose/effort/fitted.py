@@ -4,14 +4,27 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rhythmid.diagnose.evidence import Linearised
+from rhythmid.diagnose.constants import UNNAMED_EFFORT
+from rhythmid.diagnose.evidence import Linearised, odds_of_rests
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.identify.drive import controlled
-from rhythmid.identify.inverse_dynamics.estimate import EffortFit
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.estimate import EffortFit, size_of
 from rhythmid.model import Model
 from rhythmid.simulation.transport import INPUT_DELAY
 from rhythmid.value import Prior
+
+Array = NDArray[np.float64]
+
+
+def odds_at_rest(fit: EffortFit, balance: Balance) -> Array:
+    """Log odds (r,) of the rests of a balance under a fitted model.
+
+    What models of real machines leave of the effort does not count against one.
+    """
+    return odds_of_rests(balance.rests.excess(fit.model), max(fit.scale, UNNAMED_EFFORT * size_of(balance)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +43,14 @@ class Fitted:
     shape: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, elements: tuple[str, ...], kind: Kind, fit: EffortFit, priors: dict[str, Prior]) -> "Fitted":
-        """The hypothesis of a fit; a parameter that ends at a bound counts as fixed there."""
+    def of(
+        cls, elements: tuple[str, ...], kind: Kind, fit: EffortFit, priors: dict[str, Prior], balance: Balance
+    ) -> "Fitted":
+        """The hypothesis of a fit to a balance; a parameter that ends at a bound counts as fixed there."""
         inside = ~fit.at_limit
         linearised = Linearised(
-            fit.residual, fit.jacobian[:, inside], fit.precision[inside], fit.departure[inside]
-        )
+            fit.residual, fit.jacobian[:, inside], fit.precision[inside], fit.departure[inside], odds_at_rest(fit, balance)
+        )  # fmt: skip
         return cls(elements, kind, fit, priors, linearised)
 
     @property

@@ -108,7 +108,7 @@ def search_effort(
     _, jacobian = linearise(balance, model, names, 0.0)
     priors = priors_of(balance, model, names, jacobian[:, 1:])
     with without_deadline():  # the reference for all comparisons
-        nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors)
+        nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors, balance)
     blocks = Blocks.of(balance.record, GAP)
     reference = reference_of(balance, nominal, blocks)
     search = _Search(
@@ -369,7 +369,7 @@ class _Search:
         self, elements: tuple[str, ...], model: Model, priors: dict[str, Prior], aligned: Alignment, at: float
     ) -> Fitted:
         fit = fit_effort(self.balance, model, [n for n in model.free if n in priors], priors, aligned, at)
-        made = Fitted.of(elements, _kind_of(elements, model), fit, priors)
+        made = Fitted.of(elements, _kind_of(elements, model), fit, priors, self.balance)
         sizes = scales_of(self.balance, model)
         terms = [term for label in elements if (term := fit.model.term(label)) is not None]
         ends = [within_bounds(term, sizes) for term in terms]

@@ -165,4 +165,4 @@ def _moved(fitted: Fitted, nominal: Model, balance: Balance) -> Fitted:
         made = replace(made, mass=replace(made.mass, value=max(model.mass.value, made.mass.bounds[0])))
     names = [name for name in fitted.fit.names if name in model.parameters]
     fit = fit_effort(balance, made, names, fitted.priors, alignment=fitted.fit.alignment)
-    return Fitted.of(fitted.elements, fitted.kind, fit, fitted.priors)
+    return Fitted.of(fitted.elements, fitted.kind, fit, fitted.priors, balance)
