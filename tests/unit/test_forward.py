@@ -36,7 +36,9 @@ def found(
     """
 
     def fitted(trial: Any, *_: Any, **__: Any) -> Any:
-        run = SimpleNamespace(series=(), max_step=1e-3, compiled=SimpleNamespace(layout=SimpleNamespace(states=())))
+        run = SimpleNamespace(
+            series=(), max_step=1e-3, compiled=SimpleNamespace(layout=SimpleNamespace(states=()))
+        )
         differences = (np.ones(1), np.ones(1))
         return SimpleNamespace(
             model=trial.model, chi2=trial.chi2, samples=2000, starts=(), names=trial.model.free, converged=True, noise=QUIET,

@@ -70,7 +70,7 @@ def test_a_lightly_damped_swing_with_friction_is_scored_in_free_run_over_sixty_p
         CATALOGUE["coulomb_friction"], {"force": 0.002 * 40.0 * amplitude, "transition": 1e-3}
     )
     series = prepare([motion(machine, (amplitude, 0.0), 60.0, 1e-3)])
-    found = settle(pendulum(moment=41.0), series, [], CATALOGUE)
+    found = tuple(settle(pendulum(moment=41.0), series, [], CATALOGUE))
     assert found[0].kind == "free_run" and found[0].reason == FREE_RUN
 
 
@@ -89,7 +89,7 @@ def test_a_free_run_that_follows_a_machine_that_integrates_comes_after_the_windo
     pushed = Channel(time, force, "N")
     value = simulate(cart, time, continuous(time, force, "zero")).output
     value = value + 1e-3 * np.random.default_rng(1).standard_normal(len(time))
-    found = settle(cart, prepare([Record("cart", Channel(time, value, "m"), pushed)]), [], CATALOGUE)
+    found = tuple(settle(cart, prepare([Record("cart", Channel(time, value, "m"), pushed)]), [], CATALOGUE))
     assert [one.kind for one in found] == ["windows", "free_run"]
     assert found[0].reason.endswith(INTEGRATES) and found[1].reason == DISTURBED_FREE_RUN
     assert found[1].calibration.fit.nrmse() < FOLLOWS
@@ -102,10 +102,12 @@ def test_windows_in_which_nothing_is_missing_tell_what_a_free_run_says(monkeypat
         replace(plain, scoring=replace(plain.scoring, kind="windows")),
         replace(plain, verdict=verdict),
     ]
-    fit = SimpleNamespace(fit=SimpleNamespace(model=hopper()))
-    effort = SimpleNamespace(applies=False, free_run_means_something=True, effort_share=0.0, notes=())
+    fit = SimpleNamespace(fit=SimpleNamespace(model=hopper(), std={}))
+    effort = SimpleNamespace(
+        applies=False, free_run_means_something=True, effort_share=0.0, notes=(), band_left_out=False
+    )
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
-    monkeypatch.setattr(module, "settle", lambda *_: [SimpleNamespace(kind="windows")] * 2)
+    monkeypatch.setattr(module, "settle", lambda *_: iter([SimpleNamespace(kind="windows")] * 2))
     monkeypatch.setattr(module, "free_run", lambda *_: SimpleNamespace(search=fit))
     monkeypatch.setattr(module, "compose", lambda *_: made.pop(0))
     found = diagnose(records(hopper(), SHORT[1:2]), hopper(), catalogue=CATALOGUE).diagnosis
@@ -153,8 +155,8 @@ def test_without_separate_records_the_last_part_of_every_run_is_held_out():
 def test_what_the_first_scoring_leaves_without_a_name_is_tried_in_the_second(monkeypatch, verdicts, kept):
     made = [diagnosed(one) for one in verdicts]
     left = list(made)
-    fit = SimpleNamespace(fit=SimpleNamespace(model=hopper()))
-    monkeypatch.setattr(module, "settle", lambda *_, **__: [SimpleNamespace(kind="windows")] * 2)
+    fit = SimpleNamespace(fit=SimpleNamespace(model=hopper(), std={}))
+    monkeypatch.setattr(module, "settle", lambda *_, **__: iter([SimpleNamespace(kind="windows")] * 2))
     monkeypatch.setattr(module, "free_run", lambda *_: SimpleNamespace(search=fit))
     monkeypatch.setattr(module, "compose", lambda *_: left.pop(0))
     found = diagnose(records(hopper(), SHORT[1:2]), hopper(), catalogue=CATALOGUE).diagnosis
@@ -263,7 +265,7 @@ def asked(
 
     def free_run(_, scoring) -> SimpleNamespace:
         order.append(scoring.kind)
-        return SimpleNamespace(search=SimpleNamespace(fit=SimpleNamespace(model=hopper())))
+        return SimpleNamespace(search=SimpleNamespace(fit=SimpleNamespace(model=hopper(), std={})))
 
     effort = SimpleNamespace(
         applies=True, free_run_means_something=means, effort_share=share, notes=(), band_left_out=band_left_out
@@ -273,8 +275,10 @@ def asked(
     monkeypatch.setattr(
         module,
         "settle",
-        lambda *given: [SimpleNamespace(kind="free_run")] if follows and not given[-1]
-        else [SimpleNamespace(kind="windows")] if given[-1] else [],
+        lambda *given: iter(
+            [SimpleNamespace(kind="free_run")] if follows and not given[-1]
+            else [SimpleNamespace(kind="windows")] if given[-1] else []
+        ),
     )  # fmt: skip
     monkeypatch.setattr(module, "free_run", free_run)
     monkeypatch.setattr(module, "compose", lambda *_: diagnosed("undecided", kind=order[-1]))
@@ -318,7 +322,7 @@ def test_the_effort_is_scored_where_no_window_serves_although_those_come_first(m
         applies=True, free_run_means_something=True, effort_share=0.5, notes=(), band_left_out=False
     )  # fmt: skip
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
-    monkeypatch.setattr(module, "settle", lambda *given: fails() if given[-1] else [])
+    monkeypatch.setattr(module, "settle", lambda *given: fails() if given[-1] else iter([]))
     monkeypatch.setattr(module, "_by_effort", lambda *_: Answer(found, hopper(), SimpleNamespace()))  # type: ignore[arg-type]
     answer = diagnose(records(hopper(), SHORT[2:]), hopper(), catalogue=CATALOGUE).diagnosis
     assert answer.scoring.kind == "effort"

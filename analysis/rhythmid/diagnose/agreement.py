@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from rhythmid.diagnose.answer.result import Diagnosis
+from rhythmid.diagnose.constants import LEFT
 from rhythmid.diagnose.effort.candidate import SEEN
 from rhythmid.diagnose.hypothesis import ScoringKind, Verdict
 from rhythmid.report.quantity import in_words
@@ -11,6 +12,14 @@ HOW: Mapping[ScoringKind, str] = {"free_run": "in free run", "windows": "in wind
 # verdicts that neither state a name nor deny a mismatch
 UNSETTLED: tuple[Verdict, ...] = ("undecided", "unknown_physics")
 DOUBTED = "Believe neither without another experiment."
+
+
+def tells_all(found: Diagnosis, quasi_static: bool) -> bool:
+    """Whether effort scoring leaves nothing that the motion could tell: little effort, and nothing without a name.
+
+    The motion of a quasi-static machine, a small difference of large forces, tells less than even a little effort.
+    """
+    return found.augmented.train_nrmse < LEFT and (found.verdict not in UNSETTLED or quasi_static)
 
 
 def contradictions(chosen: int, made: Sequence[Diagnosis]) -> tuple[str, ...]:

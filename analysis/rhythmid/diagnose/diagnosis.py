@@ -4,6 +4,7 @@ From records and a nominal model to a verdict: select the records, choose how to
 the nominal model lacks, weigh the hypotheses on data that no fit has seen, and report how certain the answer is.
 """
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -13,13 +14,13 @@ from threadpoolctl import threadpool_limits
 
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.admission import Admitted, admitted
-from rhythmid.diagnose.agreement import HOW, UNSETTLED, contradictions
+from rhythmid.diagnose.agreement import HOW, contradictions, tells_all
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis, Untried
 from rhythmid.diagnose.baseline import check_free
 from rhythmid.diagnose.case import LEAST_CALIBRATION, SEARCHED, Budget, Case
-from rhythmid.diagnose.constants import DRIVES_IT, LEFT, QUASI_STATIC
+from rhythmid.diagnose.constants import DRIVES_IT, QUASI_STATIC
 from rhythmid.diagnose.effort.found_delay import with_found_delay
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
@@ -307,17 +308,18 @@ def _answers(
     if first:
         answer = _by_effort(whole, effort, effort_notes)
         yield answer
-        if _tells_all(answer.diagnosis, effort) or late(BY_MOTION):
+        if tells_all(answer.diagnosis, quasi_static) or late(BY_MOTION):
             return
     series, count = prepare((*case.records, *case.holdout)), len(case.records)
 
     def by_motion(windows: bool) -> Iterator[Answer]:
-        with deadline(case.budget.at(SEARCHED, LEAST_CALIBRATION)):
-            ways = settle(
-                case.nominal, series[:count], series[count:], case.catalogue, case.pool, case.tell, windows
-            )
-        for number, scoring in enumerate(ways):
-            if number and late(f"scoring {HOW[scoring.kind]}"):
+        ways = settle(
+            case.nominal, series[:count], series[count:], case.catalogue, case.pool, case.tell, windows
+        )
+        for number in itertools.count():
+            with deadline(case.budget.at(SEARCHED, LEAST_CALIBRATION)):
+                scoring = next(ways, None)
+            if scoring is None or (number and late(f"scoring {HOW[scoring.kind]}")):
                 return
             result = free_run(case, scoring)
             diagnosis = compose(case, result, given.notes)
@@ -349,13 +351,6 @@ def _answers(
         untried.append(Untried(BY_MOTION, str(error)))
     if failed or not (driven or late(BY_EFFORT)):
         yield _by_effort(whole, effort, effort_notes)
-
-
-def _tells_all(found: Diagnosis, effort: Applicability) -> bool:
-    """Whether effort scoring leaves nothing that the motion could tell: little effort, and nothing without a name. The motion of a
-    quasi-static machine, a small difference of large forces, tells less than even a little effort."""
-    little = found.augmented.train_nrmse < LEFT
-    return little and (found.verdict not in UNSETTLED or effort.effort_share >= QUASI_STATIC)
 
 
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST_EFFECTS) -> Answer:

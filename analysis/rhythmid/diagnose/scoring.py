@@ -71,10 +71,10 @@ def settle(
     pool: ThreadPoolExecutor | None = None,
     tell: Tell = lambda _: None,
     windows: bool = True,
-) -> tuple[Scoring, ...]:
+) -> Iterator[Scoring]:
     """Calibrate the nominal model in the longest runs through which it follows the machine, in free run or in windows.
 
-    The first result is the scoring mode. If it is windows, a free run that is not hopeless is the second result, for effects that
+    The results are computed on demand. The first result is the scoring mode. If it is windows, a free run that is not hopeless is the second result, for effects that
     windows leave unnamed: windows hide slow effects, and spectral lines narrower than their resolution. If the machine integrates
     or is unstable, a free run is the second result only if it follows the machine. Without `windows`, the only possible result is a
     free run that follows the machine. Without `separate` held-out series the last fifth of every run is held out.
@@ -103,28 +103,33 @@ def settle(
         if scoring.calibration.fit.nrmse() < FOLLOWS:
             break
     if not windows:
-        return tuple(one for one in tried if one.calibration.fit.nrmse() < FOLLOWS)
+        yield from (one for one in tried if one.calibration.fit.nrmse() < FOLLOWS)
+        return
     if not tried:
         assert failure is not None
         raise failure
     # the machine moves less in a shorter window, so the error must also decrease as a share of that motion
     longest, best = tried[0], min(tried, key=lambda one: one.calibration.fit.nrmse())
     if longest.kind != "free_run":
-        chosen = longest if best.error >= BETTER_TOGETHER * longest.error else best
+        yield longest if best.error >= BETTER_TOGETHER * longest.error else best
         if time_is_up():
-            return (chosen,)
+            return
         # windows do not show slow effects
         free = _Way("free_run", DISTURBED_FREE_RUN, list)
         try:
             disturbed = _scored(free, model, series, separate, catalogue, pool, tell)
         except InputError:
-            return (chosen,)
-        return (chosen, disturbed) if disturbed.calibration.fit.nrmse() < FOLLOWS else (chosen,)
+            return
+        if disturbed.calibration.fit.nrmse() < FOLLOWS:
+            yield disturbed
+        return
     error = longest.calibration.fit.nrmse()
     if best.error >= BETTER_TOGETHER * longest.error:
-        return (longest if error < FOLLOWS else replace(longest, reason=FREE_RUN_IN_PART),)
-    near = error < HOPELESS
-    return (best, replace(longest, reason=FREE_RUN_BESIDE)) if near and best is not longest else (best,)
+        yield longest if error < FOLLOWS else replace(longest, reason=FREE_RUN_IN_PART)
+        return
+    yield best
+    if error < HOPELESS and best is not longest:
+        yield replace(longest, reason=FREE_RUN_BESIDE)
 
 
 @dataclass(frozen=True)
