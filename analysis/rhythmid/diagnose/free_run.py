@@ -29,8 +29,7 @@ from rhythmid.diagnose.free_functions import motion_maps
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.diagnose.intervals import profiled
 from rhythmid.diagnose.location import Dependence, dependences
-from rhythmid.diagnose.model_uncertainty import covariance_between, std_among
-from rhythmid.diagnose.probability import weights_of
+from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.refitted_map import refitted_map
 from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import Search, search
@@ -176,9 +175,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     if unseen and case.budget.passed(EXPLAINED):
         shown, found = (), _untried(found, RERUN)
     fit = with_robust_covariance(found.fit)
-    weights = weights_of(contest, selection)
-    among = std_among(fit.std, selection.chosen, contest.hypotheses, weights)
-    errors = size_errors(fit.model, selection.chosen.elements, among)
+    errors = size_errors(fit.model, selection.chosen.elements, fit.std)
     if shown:
         case.tell("running both models over the held-out records")
     found = replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed))

@@ -36,8 +36,7 @@ from rhythmid.diagnose.evidence import (
     with_trusted_rests,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
-from rhythmid.diagnose.model_uncertainty import covariance_between, std_among
-from rhythmid.diagnose.probability import weights_of
+from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.size_error import size_errors
 from rhythmid.diagnose.verdict import Decision, decide
@@ -199,9 +198,7 @@ def effort_run(
         contest = replace(contest, structured_after=lasting)
     least = detectable(predicted[chosen.elements].error, time) / size
     robust = replace(chosen, fit=with_robust_std(chosen.fit, found.balance.record))
-    weights = weights_of(contest, selection)
-    among = std_among(robust.std(), selection.chosen, contest.hypotheses, weights)
-    errors_of_sizes = size_errors(chosen.fit.model, chosen.elements, among)
+    errors_of_sizes = size_errors(chosen.fit.model, chosen.elements, robust.std())
     return EffortResult(
         applicability,
         found,
