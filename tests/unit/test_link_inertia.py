@@ -153,7 +153,9 @@ def test_an_inertia_that_does_what_the_rotor_does_is_left_to_the_rotor(leg: Mach
 
 
 # principal moments in MuJoCo's order, so that its compiler marks the frames as the same
-ALIGNED = legged.TWO_LINKS.replace(' rpy="0.1 0.2 0"', "").replace('ixx="0.01" iyy="0.012"', 'ixx="0.012" iyy="0.01"')
+ALIGNED = legged.TWO_LINKS.replace(' rpy="0.1 0.2 0"', "").replace(
+    'ixx="0.01" iyy="0.012"', 'ixx="0.012" iyy="0.01"'
+)
 ALIGNED = ALIGNED.replace('-0.4"/><axis xyz="0 1 0"/>', '-0.4"/><axis xyz="1 0 0"/>')
 
 

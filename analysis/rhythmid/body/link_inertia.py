@@ -84,7 +84,10 @@ class Principal:
         apart = int(mj.mjtSameFrame.mjSAMEFRAME_NONE)
         model.body_sameframe[link] = apart
         with_inertia = [int(mj.mjtSameFrame.mjSAMEFRAME_INERTIA), int(mj.mjtSameFrame.mjSAMEFRAME_INERTIAROT)]
-        for owner, same in ((model.geom_bodyid, model.geom_sameframe), (model.site_bodyid, model.site_sameframe)):
+        for owner, same in (
+            (model.geom_bodyid, model.geom_sameframe),
+            (model.site_bodyid, model.site_sameframe),
+        ):
             same[(owner == link) & np.isin(same, with_inertia)] = apart
 
 

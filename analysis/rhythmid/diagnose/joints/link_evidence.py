@@ -20,6 +20,7 @@ from rhythmid.identify.inverse_dynamics.estimate import fit_effort, linearise
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.robust_covariance import with_robust_std
 from rhythmid.model import Model
+from rhythmid.simulation.transport import INPUT_DELAY
 from rhythmid.value import Prior
 
 
@@ -105,7 +106,7 @@ def weight_of_joints(
             sides = before[joint], after[joint]
             hypotheses = [fit for one in sides for fit in (one.result.nominal, _of_effects(one))]
             at = [(one.case.nominal, one.result.search.balance) for one in sides]
-            total += _gain(before[joint], hypotheses, *at)
+            total += gain_of(before[joint], hypotheses, *at)
     return total
 
 
@@ -126,7 +127,7 @@ def weight_of_values(
     for joint in joints:
         one = found[joint]
         hypotheses = [one.result.nominal, _of_effects(one)]
-        total += _gain(
+        total += gain_of(
             one,
             hypotheses,
             *((side.models[joint], side.balance(joint, one.late)) for side in (before, after)),
@@ -134,7 +135,18 @@ def weight_of_values(
     return total
 
 
-def _gain(
+def parts_of(one: JointResult) -> list[Fitted]:
+    """The hypotheses of a joint that a cause beside it may leave: those whose effects are part of the chosen ones or of the best ones without a
+    value of the body, the nominal path among them. A longer delay is no such effect."""
+    wholes = [set(one.result.chosen.elements), set(_of_effects(one).elements)]
+    return [
+        fit
+        for fit in one.result.search.hypotheses
+        if INPUT_DELAY not in fit.elements and any(set(fit.elements) <= whole for whole in wholes)
+    ]
+
+
+def gain_of(
     one: JointResult,
     hypotheses: Sequence[Fitted],
     before: tuple[Model, Balance],

@@ -134,11 +134,15 @@ def rows_of(balances: JointBalances, joint: str, model: Model, late: float, link
     return Rows(fit.residual, columns, fit.jacobian, balance.record)
 
 
-def weighted_rows(one: Rows) -> tuple[Array, Array]:
-    """Residual and columns of a joint in units of its noise, with the joint's other parameters projected out."""
-    scale = scale_of(one.residual)
-    lasts = autocorrelation_time(one.residual, one.record)
-    root = np.sqrt(weights_of(one.residual, scale) / lasts) / scale
+def weighted_rows(one: Rows, noise: Array | None = None) -> tuple[Array, Array]:
+    """Residual and columns of a joint in units of its noise, with the joint's other parameters projected out.
+
+    The `noise` (n,) is the residual itself unless that of a better model is given.
+    """
+    noise = one.residual if noise is None else noise
+    scale = scale_of(noise)
+    lasts = autocorrelation_time(noise, one.record)
+    root = np.sqrt(weights_of(noise, scale) / lasts) / scale
     basis = orthonormal(one.beside * root[:, None])
 
     def without(signal: Array) -> Array:
