@@ -279,11 +279,13 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
     alike = _held_by_alike(one) >= STATED
     if alike and chosen.kind == "effects" and decision.verdict == "undecided":
         return chosen.elements
-    if chosen.kind not in ("freed_value", "delay") or not (alike or decision.joint >= STATED):
+    if chosen.kind not in ("freed_value", "delay"):
         return ()
     known = all(label == INERTIA or name_of(one.joint, label)[0] != label for label in own)
     if not known:  # a wrong value of the path itself is left to the model's author
         return ()
+    if not (alike or decision.joint >= STATED):
+        return decision.agreed  # the effects that the evidence has beside any value
     named = tuple(label for label in decision.named if _differs(one, label))
     return named if alike else tuple(label for label in named if decision.probability[label] >= STATED)
 
