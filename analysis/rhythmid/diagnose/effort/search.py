@@ -28,13 +28,13 @@ from rhythmid.diagnose.effort.candidate import (
     starts_of,
     widest,
 )
-from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.effort.fitted import Fitted, kind_of, worst
 from rhythmid.diagnose.effort.kin import at_values_of, contained, kin, shortlist
 from rhythmid.diagnose.effort.reference import Mapped, reference_of
 from rhythmid.diagnose.effort.scales import scales_at, scales_of
 from rhythmid.diagnose.evidence import Blocks, predict
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, special_case
-from rhythmid.diagnose.rejections import Claim, keeps_shape, rejections_of, replaces
+from rhythmid.diagnose.hypothesis import Hypothesis, special_case
+from rhythmid.diagnose.rejections import AT_END, SHAPES, Claim, keeps_shape, rejections_of, replaces
 from rhythmid.diagnose.shape import within_bounds
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
@@ -181,6 +181,8 @@ class _Search:
                 if fitted is None or self._known(fitted):
                     continue
                 (new if keeps_shape(fitted.shape) else self.ruled_out).append(fitted)
+                if one.start.element is not None and fitted.shape[AT_END] < SHAPES[AT_END]:
+                    self._in_parts(base, one.start.element)
         if not new:
             return None
         new = self._nearer(new)
@@ -221,7 +223,7 @@ class _Search:
             if model is not None and not time_is_up():
                 aligned = self._aligned(plain.elements)
                 fit = self._fit(plain.elements, model, plain.priors, aligned, best.fit.alignment)
-                made = replace(fit, shape=_worst(plain.shape, fit.shape))
+                made = replace(fit, shape=worst(plain.shape, fit.shape))
                 *_, again = predict(
                     [one.linearised for one in (*new, made)], self.blocks, self.balance.record
                 )
@@ -276,7 +278,7 @@ class _Search:
         for one in rest:  # with fewer effects its shape statistics may change
             term = made.fit.model.term(one)
             if term is not None:
-                shape = _worst(shape, self._shape(made, self.without(made, one), one, term.element))
+                shape = worst(shape, self._shape(made, self.without(made, one), one, term.element))
         return replace(made, shape=shape)
 
     def reduce(self, fitted: Fitted) -> None:
@@ -293,6 +295,18 @@ class _Search:
             term = fitted.fit.model.term(label)
             if term is not None:
                 self._simplify(base, term.element)
+
+    def _in_parts(self, base: Fitted, law: Element) -> None:
+        """Fit the base with the effects that together are a law at the end of its range."""
+        made: Fitted | None = base
+        for name in law.beyond:
+            if made is None or any(name == t.element.name for t in made.fit.model.terms):
+                continue
+            model = made.fit.model
+            starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
+            screened = screen(self.balance, made.fit, [one for one in starts if one.name == name])
+            made = self.fitted(made, screened[0]) if screened else None
+        self._keep(made or base)
 
     def _keep(self, fitted: Fitted) -> None:
         if not self._known(fitted):
@@ -328,7 +342,7 @@ class _Search:
             return None
         made = self._fit((*base.elements, label), model, priors, aligned, alignment)
         own = self._shape(made, base, label, start.element) if start.element else {}
-        return replace(made, shape=_worst(base.shape, made.shape, own))
+        return replace(made, shape=worst(base.shape, made.shape, own))
 
     def _shape(self, made: Fitted, base: Fitted, label: str, element: Element) -> dict[str, float]:
         """Statistics of an effect by the name of the rule that uses them; `base` is the hypothesis without it."""
@@ -371,7 +385,7 @@ class _Search:
         self, elements: tuple[str, ...], model: Model, priors: dict[str, Prior], aligned: Alignment, at: float
     ) -> Fitted:
         fit = fit_effort(self.balance, model, [n for n in model.free if n in priors], priors, aligned, at)
-        made = Fitted.of(elements, _kind_of(elements, model), fit, priors)
+        made = Fitted.of(elements, kind_of(elements, model), fit, priors)
         sizes = scales_of(self.balance, model)
         terms = [term for label in elements if (term := fit.model.term(label)) is not None]
         ends = [within_bounds(term, sizes) for term in terms]
@@ -384,17 +398,3 @@ class _Search:
 
     def _known(self, fitted: Fitted) -> bool:
         return any(set(one.elements) == set(fitted.elements) for one in self.found)
-
-
-def _worst(*shapes: Mapping[str, float]) -> dict[str, float]:
-    """The smallest value of each statistic."""
-    return {name: min(one[name] for one in shapes if name in one) for name in set().union(*shapes)}
-
-
-def _kind_of(elements: Sequence[str], model: Model) -> Kind:
-    """The kind of hypothesis that these additions to the nominal model make."""
-    if not elements:
-        return "nominal"
-    if INPUT_DELAY in elements:
-        return "delay"
-    return "effects" if all(model.term(label) is not None for label in elements) else "freed_value"

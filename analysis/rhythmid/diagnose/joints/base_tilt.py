@@ -227,7 +227,7 @@ def _options(one: JointResult, weight: Sequence[Array]) -> list[_Option]:
     made = []
     for part in parts_of(one):
         left, columns = weighted_rows(_rows(one.result.search.balance, part.fit, weight), noise)
-        triangle = np.linalg.qr(np.column_stack([columns, left]), mode="r")
+        triangle: Array = np.asarray(np.linalg.qr(np.column_stack([columns, left]), mode="r"))
         made.append(_Option(part.fit.model, triangle, price * len(part.elements)))
     return made
 
@@ -243,7 +243,7 @@ def _best_beside(options: Mapping[str, list[_Option]], across: Array) -> dict[st
             [one.triangle[:, :3] @ across.T for one in chosen] + [np.eye(len(across)) / ANY]
         )
         left = np.concatenate([one.triangle[:, 3] for one in chosen] + [np.zeros(len(across))])
-        return -np.linalg.lstsq(rows, left, rcond=None)[0]
+        return np.asarray(-np.linalg.lstsq(rows, left, rcond=None)[0], dtype=np.float64)
 
     best: tuple[float, list[_Option]] | None = None
     for start in (one for some in options.values() for one in some):

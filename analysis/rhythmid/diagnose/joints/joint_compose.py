@@ -250,13 +250,16 @@ def _holds(one: JointEffect, answers: Mapping[str, Diagnosis], of_links: Mapping
     """Whether an effect is sure enough for the headline: by itself, or with those that are listed in its place.
 
     If the joint's own answer is undecided, what was fitted there has to explain the effort as an identified model does: what leaves more of it
-    may be the best of several wrong explanations.
+    may be the best of several wrong explanations. A sure part of an explanation that is not sure as a whole remains in doubt.
     """
     answer = None if one.joint is None else answers.get(one.joint)
     same = of_links.get(one.link, ()) if one.link else ()
     if max(one.probability * max(len(same), 1), one.together) < STATED:
         return False
-    return answer is None or answer.verdict == "missing_physics" or error_of(answer.fit["augmented"]) < BLIND
+    if answer is None or answer.verdict == "missing_physics":
+        return True
+    part = one.link is None and answer.joint_probability < STATED <= one.probability
+    return not part and error_of(answer.fit["augmented"]) < BLIND
 
 
 def _in_its_place(
