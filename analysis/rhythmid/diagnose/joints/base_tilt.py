@@ -149,12 +149,18 @@ def likely_tilt(
         directions
     )
     options = {joint: _options(one, weights[joint]) for joint, one in found.items()}
-    paths = _best_beside(options, size * directions)
-    tilt = replace(_fitted(balances, found, paths, weights, directions), open=undetermined)
+    made = []
+    for paths in (
+        {joint: balances.models[joint] for joint in found},
+        _best_beside(options, size * directions),
+    ):
+        one = replace(_fitted(balances, found, paths, weights, directions), open=undetermined)
+        now = JointBalances.of(balances.machine.with_gravity(one.gravity), records, balances)
+        made.append(_weighed(one, balances, now, found))
+    plain, richer = made
+    tilt = richer if richer.weight > plain.weight + decisive(1) else plain
     if not tilt.moved:
         return None
-    now = JointBalances.of(balances.machine.with_gravity(tilt.gravity), records, balances)
-    tilt = _weighed(tilt, balances, now, found)
     return tilt if tilt.weight > price and _matters(tilt, balances, found, weights) else None
 
 
