@@ -124,31 +124,14 @@ def _best_without(one: JointResult, begin: str) -> Fitted:
     return max(found, key=lambda fit: score[fit.elements])
 
 
-def _of_other_links(one: JointResult, link: str, balances: JointBalances) -> list[Fitted]:
-    """The best hypothesis of a joint that frees no value of this link, and those that free one value of another link that the joint moves."""
-    body = balances.machine.body
-    moved = [f"{BODY}.{name}." for name in body.links if name != link and body.joint_of(name) == one.joint]
-    alone = [
-        fit
-        for fit in one.result.search.hypotheses
-        if len(fit.elements) == 1 and fit.elements[0].startswith(tuple(moved))
-    ]
-    return [_best_without(one, f"{BODY}.{link}."), *alone]
-
-
 def weight_of_values(
-    found: Mapping[str, JointResult], before: JointBalances, after: JointBalances, joints: Collection[str], link: str | None = None,
+    found: Mapping[str, JointResult], before: JointBalances, after: JointBalances, joints: Collection[str],
 ) -> float:  # fmt: skip
-    """Log odds that these joints together give the values of the body `after` against those `before`, with the effects found at them.
-
-    Where the values are those of one `link`, a joint may also free values of other links, among them each of the link that it moves: what they
-    explain is no evidence for this one.
-    """
+    """Log odds that these joints together give the values of the body `after` against those `before`, with the effects found at them."""
     total = 0.0
     for joint in joints:
         one = found[joint]
         hypotheses = [one.result.nominal, _of_effects(one)]
-        hypotheses += [] if link is None else _of_other_links(one, link, before)
         total += gain_of(
             one,
             hypotheses,
