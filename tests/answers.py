@@ -35,5 +35,5 @@ def diagnosed(
         {},
         {},
         "more of the same",
-        Scored(kind, None, "it applies"),
+        Scored(kind, None, "it applies", 1),
     )

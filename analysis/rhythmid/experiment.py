@@ -22,6 +22,7 @@ from rhythmid.excitation.excitation import Excitation
 from rhythmid.excitation.sequence import IN_FOLDER, AnyExcitation
 from rhythmid.model import Model
 from rhythmid.settings import KEYS, Delay, Forcing, Noise, Recording, Safety, TimeMode
+from rhythmid.unstated_forcing import NO_FORCING, assumed_note, resolved_forcing
 from rhythmid.validation import ByShape, InKeys, Number, Plain, Whole, validated
 
 LONGEST_DELAY = 10.0  # [s]; a longer one was probably given in another unit
@@ -67,6 +68,8 @@ class Experiment:
         The command over time, and how the file describes it.
     forcing
         Forcing generated on the machine: amplitude [N], frequency [Hz], phase [rad].
+    forcing_assumed
+        Whether neither experiment nor model states the forcing, and one acts; see `unstated_forcing`.
     input_delay, measurement_delay
         Of command and measurement [s], or profiles of them.
     noise
@@ -118,6 +121,7 @@ class Experiment:
     joint: str = "leg"
     folder: Path = Path(".")
     elements: tuple[Path, ...] = ()
+    forcing_assumed: bool = False
 
     @classmethod
     def load(
@@ -143,6 +147,16 @@ class Experiment:
         """The model with forcing and noise, as the plant runs it."""
         return plant_model(self.model, self.forcing, self.noise, load_catalogue(self.elements))
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Notes for the user, one line each."""
+        return (assumed_note(self.forcing),) if self.forcing_assumed else ()
+
+    @property
+    def as_stated(self) -> "Experiment":
+        """The run of a machine of one's own, on which only a stated forcing acts."""
+        return replace(self, forcing=NO_FORCING, forcing_assumed=False) if self.forcing_assumed else self
+
     def with_record(self, **changes: Any) -> "Experiment":
         """A copy with other settings of the recording."""
         return replace(self, record=replace(self.record, **changes))
@@ -157,6 +171,7 @@ class Experiment:
                 "frequency": self.forcing.frequency,
                 "phase": self.forcing.phase,
             },
+            "forcing_assumed": self.forcing_assumed,
             "rate": self.time.rate,
             "time": self.time.mode,
             "duration": self.count * self.time.period_ns * 1e-9,
@@ -347,14 +362,6 @@ def _delay(given: _Profile | float | None, model: Model, label: str, folder: Pat
     return Delay(given)
 
 
-def _forcing(given: Forcing | None, model: Model) -> tuple[Forcing, Model]:
-    """The given forcing, else that of the model; and the model without its own forcing."""
-    term = model.term("periodic_forcing")
-    if term is None or given is not None:
-        return given or Forcing(), model if term is None else model.without("periodic_forcing")
-    return Forcing(**term.numbers), model
-
-
 def _experiment(
     document: Node, folder: Path, elements: tuple[Path, ...], instead: str | Path | None = None
 ) -> Experiment:
@@ -374,7 +381,7 @@ def _experiment(
         duration = given.excitation.duration  # reads the table of samples
     except InputError as error:
         place.fail(str(error))
-    forcing, model = _forcing(given.forcing, model)
+    forcing, assumed, model = resolved_forcing(given.forcing, model)
     if given.excitation.peak > given.safety.max_effort:
         place.fail(
             f"its peak of {given.excitation.peak:g} N exceeds safety.max_effort = {given.safety.max_effort:g} N"
@@ -385,5 +392,5 @@ def _experiment(
         _delay(given.delays.measurement, model, "measurement_delay", folder),
         given.noise, given.time, duration if given.duration is None else given.duration, given.seed,
         None if isinstance(given.initial, str) else (given.initial.position, given.initial.velocity),
-        given.safety, given.record, given.namespace, given.joint, folder, elements,
+        given.safety, given.record, given.namespace, given.joint, folder, elements, assumed,
     )  # fmt: skip

@@ -120,6 +120,8 @@ class OfflineRun(Result):
     def show(self, console: "Console") -> None:
         """Print length, rate and topics."""
         console.print(f"{self.headline} of {', '.join(self.messages)}", highlight=False)
+        for note in self.experiment.notes:
+            console.print(f"note: {note}", markup=False, highlight=False)
 
     def plot(self, axis: "Axes | None" = None) -> "Axes":
         """Draw the measured position over time; see `Record.plot`."""

@@ -6,7 +6,9 @@ budget that has passed.
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from queue import Empty, SimpleQueue
+from threading import Thread
 
 from rich.console import Console
 from rich.markup import escape
@@ -18,6 +20,7 @@ from rich.text import Text
 from rhythmid.progress import Tell
 
 BAR = 20  # characters
+SILENT = 20.0  # [s] without a word after which the present step is told again
 
 
 class SpentColumn(ProgressColumn):
@@ -52,9 +55,39 @@ def spent_words(elapsed: float, seconds: float) -> str:
 
 
 @contextmanager
+def _reminded(printed: Tell) -> Iterator[Tell]:
+    """While this is open, what was told last is told again after each `SILENT` seconds of silence."""
+    told: SimpleQueue[str | None] = SimpleQueue()
+
+    def remind() -> None:
+        last = None
+        while True:
+            try:
+                last = told.get(timeout=SILENT)
+                if last is None:
+                    return
+            except Empty:
+                if last is not None:
+                    printed(f"still {last}")
+
+    def tell(what: str) -> None:
+        printed(what)
+        told.put(what)
+
+    reminder = Thread(target=remind, daemon=True)
+    reminder.start()
+    try:
+        yield tell
+    finally:
+        told.put(None)
+        reminder.join()
+
+
+@contextmanager
 def progress(console: Console, budget: float | None = None, log: bool = True) -> Iterator[Tell]:
     """While this is open, what is told stands in a line with the time since it was opened, and with a `budget` [s] the share of
-    it that is spent. With `log` each thing that was told is also printed, with the time at which it began."""
+    it that is spent. With `log` each thing that was told is also printed, with the time at which it began; where no line shows the
+    time, as in a file, it is printed again after each `SILENT` seconds in which nothing else was told."""
     columns: list[ProgressColumn] = [
         SpinnerColumn(table_column=Column(min_width=1)),
         TimeElapsedColumn(table_column=Column(min_width=len("0:00:00"))),
@@ -71,7 +104,8 @@ def progress(console: Console, budget: float | None = None, log: bool = True) ->
             console.print(f"[dim]{time.monotonic() - began:6.1f} s  {escape(what)}[/]")
 
     if not console.is_interactive:  # a bar would leave an empty line there
-        yield printed
+        with _reminded(printed) if log else nullcontext(printed) as told:
+            yield told
         return
     with Progress(*columns, console=console, transient=True, expand=True) as bar:
         task = bar.add_task("", total=None)

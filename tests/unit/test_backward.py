@@ -44,7 +44,7 @@ def test_effects_are_exchanged_for_those_that_scored_well_or_fit_well_alone(monk
     scored = {
         name: {p.name: 0.1 for p in CATALOGUE[name].parameters} for name in ("quadratic_drag", "backlash")
     }
-    first = Round(tuple(Score(0, CATALOGUE[name], guess, 50.0, 1.0) for name, guess in scored.items()), 0.0)
+    first = Round(tuple(Score(CATALOGUE[name], guess, 50.0, 1.0) for name, guess in scored.items()), 0.0)
     trials = {one.added: one for one in (best, *alone)}
     kept, _ = module.eliminate(best, [SERIES], CATALOGUE, trials, QUIET, 1e-3, [first], 10.0, lambda _: None)
     assert kept is best
@@ -72,7 +72,7 @@ def test_what_an_exchange_makes_idle_is_left_out(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(module, "under_noise", lambda trials, *_: list(trials))
     best = trial(100.0, 200.0, coulomb_friction={"force": 1.0}, cubic_stiffness={"coefficient": 10.0})
     guess = {p.name: 0.1 for p in CATALOGUE["quadratic_drag"].parameters}
-    first = Round((Score(0, CATALOGUE["quadratic_drag"], guess, 50.0, 1.0),), 0.0)
+    first = Round((Score(CATALOGUE["quadratic_drag"], guess, 50.0, 1.0),), 0.0)
     kept, _ = module.eliminate(
         best, [SERIES], CATALOGUE, {best.added: best}, QUIET, 1e-3, [first], 10.0, lambda _: None
     )

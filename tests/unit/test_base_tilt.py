@@ -9,7 +9,7 @@ from legged import TWO_LINKS, recorded, references
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.joints.base_tilt import BaseTilt, directions_of, turned
 from rhythmid.diagnose.joints.joint_diagnosis import MachineAnswer, diagnose_machine
-from rhythmid.diagnose.joints.payload_place import Rows
+from rhythmid.diagnose.joints.payload_place import in_units_of_noise
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 
 PATH = (
@@ -71,13 +71,14 @@ def test_an_upright_base_is_not_named(arm: Machine):
 def test_joints_that_feel_gravity_only_along_itself_determine_no_tilt():
     rng = np.random.default_rng(1)
     residual = rng.normal(size=300)
-    lift = Rows(
-        residual, np.tile([0.0, 0.0, 5.0], (300, 1)), np.ones((300, 1)), np.zeros(300, dtype=np.int64)
-    )
-    directions, _ = directions_of([lift], GRAVITY)
+    record = np.zeros(300, dtype=np.int64)
+
+    def found(weight: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+        return directions_of([in_units_of_noise(residual, weight, np.ones((300, 1)), record)], GRAVITY)
+
+    directions, _ = found(np.tile([0.0, 0.0, 5.0], (300, 1)))
     assert not len(directions)
-    weight = np.column_stack([rng.normal(size=300), np.zeros(300), rng.normal(size=300)])
-    directions, unknown = directions_of([replace(lift, columns=weight)], GRAVITY)
+    directions, unknown = found(np.column_stack([rng.normal(size=300), np.zeros(300), rng.normal(size=300)]))
     assert np.abs(directions) == pytest.approx(np.array([[1.0, 0.0, 0.0]]))
     assert unknown is not None and np.abs(unknown) == pytest.approx(np.array([0.0, 1.0, 0.0]))
 

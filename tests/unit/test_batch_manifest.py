@@ -119,3 +119,30 @@ def test_a_table_that_signals_name_counts_as_the_recording(folder):
     write_swing(folder / "a" / "1.csv", rate=50.0)
     (after,) = load(folder, text)
     assert before.key != after.key
+
+
+FOLDERS = """
+command: identify
+entries:
+  - {bags: "a/*.csv", model: %sa/model.yaml%s, signals: a/signals.yaml}
+  - {bags: "b/*.csv", model: %sb/model.yaml%s, signals: b/signals.yaml}
+"""
+
+
+def of_two_folders(folder, content, named=""):
+    for name in "ab":
+        write_files(folder / name)
+    (folder / "b" / "model.yaml").write_text((folder / "a" / "model.yaml").read_text() + content)
+    marks = (f"{{{named}: ", "}") * 2 if named else ("",) * 4
+    return load(folder, FOLDERS % marks)
+
+
+def test_models_of_equal_file_names_and_other_content_are_not_taken_for_one(folder):
+    tasks = of_two_folders(folder, "# another machine\n")
+    assert {task.labels for task in tasks} == {("a/model.yaml", "signals"), ("b/model.yaml", "signals")}
+    assert tasks[0].name == "a/1.csv · a/model.yaml" and tasks[-1].name == "b/2.csv · b/model.yaml"
+
+
+def test_files_of_equal_content_or_of_one_given_name_are_taken_for_one(folder):
+    assert {task.labels for task in of_two_folders(folder, "")} == {("model", "signals")}
+    assert {task.labels for task in of_two_folders(folder, "# other\n", "rig")} == {("rig", "signals")}

@@ -15,7 +15,7 @@ from rhythmid.deadline import SPENT, deadline
 from rhythmid.diagnose import free_run as search_of_motion
 from rhythmid.diagnose.answer.compose import MORE_TIME
 from rhythmid.diagnose.answer.result import Diagnosis
-from rhythmid.diagnose.case import Budget
+from rhythmid.diagnose.case import EXPLAINED, Budget
 from rhythmid.diagnose.contenders import contend, rows_of
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.diagnose.effort import search
@@ -146,3 +146,11 @@ def test_once_time_is_up_only_the_best_model_of_each_number_of_effects_is_weighe
     with deadline(-math.inf):
         made = contend(trials, series, rows_of(series, (), WHITE), 1e-3)
     assert [one.trial.added for one in made] == [(), ("coulomb_friction",)]
+
+
+def test_what_would_end_after_its_share_of_a_budget_is_not_begun(monkeypatch):
+    monkeypatch.setattr(Budget, "allows", lambda self, seconds, share: False)
+    monkeypatch.setattr(Budget, "passed", lambda self, share: share >= EXPLAINED)
+    found = by_motion()
+    assert found.missing[0].element == "coulomb_friction"
+    assert {search_of_motion.BEFORE[0], search_of_motion.INTERVALS[0]} <= set(cut_off(found))

@@ -198,6 +198,16 @@ SAME = HOPPER.replace(
 )
 
 
+AXIS = """
+inertia: {mass: {value: 2.0, unit: kg}}
+force:
+  - linear_spring: {stiffness: {value: 300.0, unit: N/m}, rest_length: {value: 0.0, unit: m}}
+  - viscous_damper: {damping: {value: 5.0, unit: N*s/m}}
+command:
+  - input_delay: {delay: {value: 0.01, unit: s}}
+"""
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -230,6 +240,43 @@ def test_what_cannot_work_is_refused_in_one_line(changes, words):
     assert "\n" not in str(refusal.value)
 
 
+def test_a_machine_without_forcing_is_designed_for_with_the_sum_of_its_delays():
+    axis = Model.from_text(AXIS, catalogue=CATALOGUE)
+    wanted = Requirements.of(axis, 20.0, (0.2, 6.0), 2.0, (-0.05, 0.05), 1e-5, rate=200, unforced=True)
+    plan = design(axis, wanted)
+    assert np.all(plan.still == 0.0) and plan.visible == ()
+    assert set(plan.prediction.delays) == {"input"}
+    assert plan.prediction.delays["input"].value == pytest.approx(0.01)
+    assert any("only the sum of the two delays" in note for note in plan.notes)
+    seen = noisy(plan.prediction.record, wanted.noise_std, seed=3)
+    found = fit_from(plan.prediction.fit.model, seen)
+    for name in plan.prediction.fit.names:
+        error = found.model.value(name) - plan.prediction.fit.model.value(name)
+        assert abs(error) < 5.0 * plan.prediction.fit.std[name], name
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"harmonics": 2}, "without forcing there is no limit cycle.* --no-forcing"),
+        ({"kind": "comb"}, "--kind comb shifts its chirps along the forcing"),
+        ({"forcing": Forcing(1.0, 1.0)}, "--no-forcing contradicts"),
+        ({"envelope": (0.01, 0.05)}, "the position at rest.* leaves the envelope"),
+    ],
+)
+def test_what_a_machine_without_forcing_cannot_have_is_refused(changes, words):
+    axis = Model.from_text(AXIS, catalogue=CATALOGUE)
+    limits = {
+        "duration": 20.0,
+        "band": (0.2, 6.0),
+        "max_effort": 2.0,
+        "envelope": (-0.05, 0.05),
+        "noise_std": 1e-5,
+    }
+    with pytest.raises(InputError, match=words):
+        design(axis, Requirements.of(axis, **(limits | changes), rate=200, unforced=True))
+
+
 def test_a_parameter_that_the_design_cannot_determine_is_named():
     with pytest.raises(InputError, match="gravity.acceleration.*linear_spring.rest_length") as refusal:
         design(Model.from_text(SAME, catalogue=CATALOGUE), WANTED)
@@ -239,3 +286,17 @@ def test_a_parameter_that_the_design_cannot_determine_is_named():
 def test_a_cycle_that_is_not_damped_is_refused():
     with pytest.raises(InputError, match="limit cycle"):
         design(hopper().with_values({"switched_damper.stance": 0.0}), WANTED)
+
+
+def test_no_forcing_is_assumed_for_a_machine_that_is_not_in_newtons_and_metres():
+    servo = Model.from_text(
+        """
+units: {force: N*m, position: rad}
+inertia: {mass: 0.5}
+force:
+  - linear_spring: {stiffness: 5.0, rest_length: 0.0}
+  - viscous_damper: {damping: 0.3}
+"""
+    )
+    wanted = Requirements.of(servo, 20.0, (0.2, 6.0), 2.0, (-0.5, 0.5), 1e-5)
+    assert not wanted.forced and not wanted.forcing_assumed and wanted.harmonics == 0

@@ -64,6 +64,7 @@ def test_everything_in_the_file_arrives(folder):
 def test_a_short_file_gets_the_papers_forcing_no_delay_and_the_limit_cycle(folder):
     experiment = load(folder, SHORT)
     assert experiment.forcing == Forcing(1.0, 1.0, 0.0)
+    assert experiment.forcing_assumed and experiment.description()["forcing_assumed"]
     assert experiment.input_delay == experiment.measurement_delay == Delay(0.0)
     assert experiment.initial is None
     assert (experiment.count, experiment.time.rate) == (1000, 1000)
@@ -273,3 +274,41 @@ def test_a_fault_in_the_model_file_names_the_model_file(folder):
 def test_a_run_too_long_to_keep_is_refused(folder):
     with pytest.raises(InputError, match="1000000000 samples are too many"):
         perform(load(folder, SHORT + "duration: 1000000\n"))
+
+
+PENDULUM = """\
+units: {force: N*m, position: rad}
+inertia: {mass: 0.5}
+force:
+  - linear_spring: {stiffness: 5.0, rest_length: 0.0}
+  - viscous_damper: {damping: 0.3}
+"""
+
+
+def test_nothing_acts_that_is_not_stated_where_the_model_is_not_in_newtons_and_metres(folder):
+    (folder / "hopper.yaml").write_text(PENDULUM, encoding="utf-8")
+    experiment = load(folder, SHORT)
+    assert experiment.forcing.amplitude == 0.0 and not experiment.notes
+    sent = perform(experiment)
+    assert not np.any(sent["forcing"].effort)
+    assert np.ptp(sent["plant/joint_states"].position) < 1e-9
+
+
+def test_units_that_are_stated_to_be_newtons_and_metres_change_nothing(folder):
+    said = "units: {force: N, position: m}\n" + PAPER.read_text(encoding="utf-8").replace("unit: kg,", "")
+    (folder / "hopper.yaml").write_text(said, encoding="utf-8")
+    assert load(folder, SHORT).forcing == Forcing()
+
+
+def test_an_assumed_forcing_is_told_in_one_line_and_a_stated_one_is_not(folder):
+    experiment = load(folder, SHORT)
+    (note,) = experiment.notes
+    assert note.startswith("no forcing is stated: 1 N at 1 Hz acts; write  forcing: {amplitude: 0}")
+    stated = load(folder, SHORT + "forcing: {amplitude: 0}\n")
+    assert not stated.notes and not stated.description()["forcing_assumed"]
+
+
+def test_an_assumed_forcing_is_not_said_to_act_on_a_machine_that_replaces_the_plant(folder):
+    assert load(folder, SHORT).as_stated.description()["forcing"]["amplitude"] == 0.0
+    stated = load(folder, SHORT + "forcing: {amplitude: 2.0}\n")
+    assert stated.as_stated is stated

@@ -45,9 +45,9 @@ def found(
 
     def one_round(fit: Any, added: tuple[str, ...], *_: Any) -> tuple[Round, Any]:
         place = len(added)
-        scores = [Score(0, CATALOGUE[ORDER[place]], VALUES[place], 1e3, 1.0)] if place < len(gains) else []
+        scores = [Score(CATALOGUE[ORDER[place]], VALUES[place], 1e3, 1.0)] if place < len(gains) else []
         kin = [CATALOGUE[name] for name in MISLEADING[: 0 if place else misleading]]
-        scores = [*(Score(1, one, {p.name: 0.01 for p in one.parameters}, 2e3, 1.0) for one in kin), *scores]
+        scores = [*(Score(one, {p.name: 0.01 for p in one.parameters}, 2e3, 1.0) for one in kin), *scores]
         if local:
             return Round((), 1.0, added, tuple(scores)), fit
         return Round(tuple(scores), 0.0 if scores else 1.0, added), fit

@@ -31,7 +31,7 @@ def test_the_dictionary_has_the_shape_that_other_programs_rely_on(found) -> None
     assert set(result["methods"]["paper"]) == {"G0", "G-1", "G+1"}
     assert set(result["methods"]["paper"]["G0"]) == {"sum"}
     assert set(result["methods"]["paper"]["G-1"]) == {"input", "measurement"}
-    assert {"rate", "gaps", "jitter_std", "nrmse"} <= set(result["quality"])
+    assert {"rate", "gaps", "jitter_std", "nrmse", "averaged"} <= set(result["quality"])
     for harmonic in result["harmonics"]:
         lengths = {len(harmonic[key]) for key in ("frequency", "magnitude", "phase", "std")}
         assert len(lengths) == 1

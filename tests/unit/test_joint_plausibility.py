@@ -244,3 +244,31 @@ def test_efforts_that_no_reading_explains_are_not_mended(leg):
         if one.effort is not None
     }
     assert likely_joint_mend(machine, [replace(record, joints=noise)]) is None
+
+
+def with_unknown_load(record: JointRecord, joint: str, share: float) -> JointRecord:
+    """The record with a load at one joint that the body does not have, as a share of the size of its effort."""
+    one = record.joints[joint]
+    assert one.effort is not None
+    load = share * np.std(one.effort.value) * np.sign(np.sin(9.0 * one.effort.time))
+    made = replace(one, effort=replace(one.effort, value=one.effort.value + load))
+    return replace(record, joints={**record.joints, joint: made})
+
+
+def test_a_joint_that_lacks_a_part_hides_no_sign_at_another_and_its_own_sign_is_told(leg):
+    machine, record = leg
+    record = with_unknown_load(record, "knee", 0.35)
+    assert likely_joint_mend(machine, [record]) is None
+    for turned in (("hip",), ("knee",)):
+        found = likely_joint_mend(machine, [scaled(record, *turned, effort=-1.0)])
+        assert found is not None and f"effort of {turned[0]} seems to have its sign turned round" in found
+    found = likely_joint_mend(machine, [scaled(record, "hip", "knee", effort=-1.0)])
+    assert found is not None and "scale: -1 " in found
+
+
+def test_the_scale_to_write_takes_the_place_of_the_one_that_is_there(leg):
+    machine, record = leg
+    declared = replace(scaled(record, "knee", effort=-1.0), scales={"effort": {"hip": 2.0, "knee": -1.0}})
+    found = likely_joint_mend(machine, [declared])
+    assert found is not None
+    assert "write  scale: {hip: 2, knee: 1}  under 'effort:' in place of the scale that is there" in found

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rhythmid.errors import InputError
+from rhythmid.record.bag_report import quality_report
 from rhythmid.record.joint_messages import write_joint_bag
 from rhythmid.record.joint_record import JointSignals, load_joint_records
 
@@ -105,3 +106,28 @@ def test_a_scale_by_joint_goes_by_the_models_names_where_the_recording_has_other
         assert one.effort is not None
         np.testing.assert_allclose(one.output.value, position * MOTION[:, column])
         np.testing.assert_allclose(one.effort.value, effort * MOTION[:, column])
+
+
+def test_check_tells_by_joint_what_no_analysis_will_use(tmp_path):
+    time = np.round(0.001 * np.arange(4000), 6)
+    slow = np.sin(5.0 * (np.arange(4000) // 10 * 0.01))  # the sensor measures every tenth row
+    fast = np.cos(3.0 * time)
+    fast[:50] = -1e6
+    np.savetxt(
+        tmp_path / "run.csv",
+        np.column_stack([time, slow, fast]),
+        delimiter=",",
+        header="t,q_hip,q_knee",
+        comments="",
+    )
+    (tmp_path / "signals.yaml").write_text(
+        "time: {column: t}\njoints: [hip, knee]\noutput: {column: 'q_*', unit: rad}\n"
+    )
+    report = quality_report(tmp_path / "run.csv", tmp_path / "signals.yaml")
+    hip, knee = (line for line in report.lines() if "output:" in line and "column" in line)
+    assert "samples are left out" in hip and "flawless" not in hip
+    assert "50 samples hold -1000000" in knee
+    notes = "\n".join(report.notes)
+    assert "hip: samples of the output that repeat the one before" in notes and "of 4000" in notes
+    assert "knee: output: 50 samples hold exactly -1000000" in notes
+    assert {one["channel"] for one in report.to_dict()["left_out"]} == {"hip.output"}

@@ -1,10 +1,12 @@
 """A parameter's standard deviation holds what the choice of the model adds to it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
-from rhythmid.diagnose.model_uncertainty import covariance_between
+from rhythmid.diagnose.model_uncertainty import covariance_between, std_among
 
 
 def hypothesis(score: float, **values: float) -> Hypothesis:
@@ -40,3 +42,13 @@ def test_parameters_that_depart_together_leave_what_they_share_certain():
     assert between[0, 0] > 0.0
     assert np.array([1.0, 1.0, 0.0]) @ between @ np.array([1.0, 1.0, 0.0]) == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_array_equal(between[2], 0.0)
+
+
+def test_the_size_of_an_effect_is_open_where_hypotheses_that_share_the_evidence_disagree_on_it():
+    chosen = replace(hypothesis(0.0, force=8.0), elements=("friction", "lag"))
+    other = replace(hypothesis(0.0, force=2.0), elements=("friction", "mode"))
+    richer = replace(hypothesis(60.0, force=80.0), elements=("friction", "lag", "mode"))
+    weights = {chosen.key: 0.75, other.key: 0.25}  # richer hypotheses that were not accepted have none
+    found = std_among({"force": 4.0}, chosen, [chosen, other, richer], weights)
+    assert found == pytest.approx({"force": 5.0})
+    assert std_among({"force": 4.0}, chosen, [chosen, richer], {chosen.key: 1.0}) == {"force": 4.0}

@@ -8,7 +8,15 @@ import pytest
 from answers import diagnosed
 
 from machines import CATALOGUE, SHORT, hopper, records, search_of
-from rhythmid.diagnose.answer.next_experiment import MORE_FREE, _menu, next_experiment, separation
+from rhythmid.diagnose.answer.compose import RIVALS, _rivals
+from rhythmid.diagnose.answer.next_experiment import (
+    MORE_FREE,
+    NONE_NEEDED_FREE,
+    _menu,
+    _of_the_input,
+    next_experiment,
+    separation,
+)
 from rhythmid.diagnose.joints.joint_compose import _next
 from rhythmid.excitation.sequence import build
 from rhythmid.identify.output_error import estimate
@@ -46,9 +54,24 @@ def test_a_machine_that_nothing_drives_is_released_from_other_amplitudes(amplitu
     menu = separation(found.best, other.best, series, found.noise.variance, 5e-3)
     assert {one.words.split(", ")[1].split()[0] for one in menu} == factors
     assert all(one.words.startswith("a release at rest from ") and one.chi2 > 0.0 for one in menu)
-    said = next_experiment(found, [other.best], series, "missing_physics")
+    said = next_experiment(found, [other.best], series, True)
     assert said.startswith("a release at rest from ") and "coulomb_friction" in said
-    assert next_experiment(found, [], series, "undecided") == MORE_FREE
+    assert said.endswith(" standard deviations of the noise (rms)") and "chi2" not in said
+    assert next_experiment(found, [], series, True) == MORE_FREE
+    assert next_experiment(found, [other.best], series, False) == NONE_NEEDED_FREE
+
+
+def test_a_rival_is_what_the_records_do_not_tell_from_the_best():
+    series = decay(0.5)
+    nominal = Model.from_text(PENDULUM)
+    rubbing = nominal.with_element(CATALOGUE["coulomb_friction"], {"force": 5.0, "transition": 1e-3})
+    dragging = nominal.with_element(CATALOGUE["quadratic_drag"], {"coefficient": 0.1})
+    one = search_of(estimate(rubbing, series, names=nominal.free), "coulomb_friction").best
+    far = search_of(estimate(dragging, series, names=nominal.free), "quadratic_drag").best
+    one, far = sorted((one, far), key=lambda trial: trial.bic())
+    assert far.bic() - one.bic() > RIVALS
+    assert _rivals(one, one, ()) and not _rivals(far, one, ())
+    assert _rivals(far, one, (("coulomb_friction", "quadratic_drag"),))
 
 
 def test_only_a_machine_without_input_is_idle():
@@ -74,13 +97,27 @@ def test_a_machine_that_is_driven_at_another_level_in_each_record_is_not_idle():
 
 @pytest.mark.parametrize("highest", [4.0, 40.0, 400.0])
 def test_no_experiment_excites_what_the_sampling_cannot_show(highest):
-    bands = [spec["band"] for _, spec, _ in _menu(1.0, 6.0, 10.0, highest) if "band" in spec]
+    bands = [spec["band"] for _, spec, _ in _menu(1.0, "N", 6.0, 10.0, highest) if "band" in spec]
     assert bands and max(high for _, high in bands) <= highest
     assert max(high for _, high in bands) == min(highest, 21 * 6.0)
 
 
+def test_amplitudes_have_the_unit_of_the_input_and_say_how_large_they_are_beside_the_records():
+    for words, spec, _ in _menu(2.0, "N*m", 6.0, 10.0, 100.0):
+        assert spec["type"] == "silence" or " N*m (" in words or " N*m rms" in words
+    assert any(
+        words.startswith("a chirp of 6 N*m (3 times the rms")
+        for words, *_ in _menu(2.0, "N*m", 6.0, 10.0, 100.0)
+    )
+    series = prepare(records(hopper(), SHORT[2:]))
+    sizes = scales(series, hopper())
+    assert _of_the_input(series[0], hopper(), sizes) == (sizes.effort, "N")
+    asked = replace(series[0], kind="reference")
+    assert _of_the_input(asked, hopper(), sizes) == (pytest.approx(np.std(asked.drive)), "m")
+
+
 def test_every_experiment_of_the_menu_can_be_built():
-    for words, spec, factor in _menu(1.0, 6.0, 10.0, 100.0):
+    for words, spec, factor in _menu(1.0, "N", 6.0, 10.0, 100.0):
         assert build(spec).duration > 0.0 and factor > 0.0 and words
 
 

@@ -91,7 +91,7 @@ def test_unseen_records_are_judged_with_nothing_but_their_start_estimated():
 
 
 def test_the_hidden_end_is_hidden_from_the_fit_and_judged_apart():
-    seen, unseen = hold_out_tail(prepare(records(hopper(), SHORT[:1])), 0.25)
+    seen, unseen = hold_out_tail(prepare(records(hopper(), SHORT[:1])))
     assert seen[0].used.sum() + unseen[0].used.sum() == seen[0].blocks
     assert not (seen[0].used & unseen[0].used).any()
 

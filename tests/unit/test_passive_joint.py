@@ -87,7 +87,10 @@ def test_init_takes_an_effort_that_is_always_zero_at_one_joint(tmp_path: Path):
     found = start_robot([table(tmp_path, 0.0)], tmp_path / "two.urdf", tmp_path, None, load_catalogue())
     assert 'effort: {column: "*_tau"' in found.signals
     (said,) = [line for line in found.lines() if "one" in line and "always 0" in line]
-    assert said == "CHECK effort: that of one is always 0, as where no motor acts"
+    assert (
+        said
+        == "CHECK effort: that of one is always 0, as where no motor acts; where one acts whose effort was not recorded, nothing that is said of these joints holds"
+    )
 
 
 def test_init_refuses_positions_alone(tmp_path: Path):

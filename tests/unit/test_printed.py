@@ -61,7 +61,7 @@ ANSWER = Diagnosis(
     {},
     {},
     "a slow reversal [of the speed]",
-    Scored("effort", 12.0, "a controller holds the machine"),
+    Scored("effort", 12.0, "a controller holds the machine", 1),
     assumptions=("The recorded effort is taken to be true in scale.",),
     excluded=(Untried("sensor_lag", "not seen"), Untried("sensor_drift", "not seen")),
     chosen=("coulomb_friction",),
@@ -158,8 +158,24 @@ def test_only_a_few_rejections_are_told_and_the_rest_is_counted():
 
 
 def test_nothing_left_and_a_free_run_are_told_in_words():
-    assert "nothing" in remainder_words(Remainder(0.0, False, None, None))
-    assert scoring_words(Scored("free_run", None, "the model follows")) == "in free run: the model follows"
+    assert "nothing" in remainder_words(replace(ANSWER, remainder=Remainder(0.0, False, None, None)))
+    assert scoring_words(Scored("free_run", None, "the model follows", 1)) == "in free run: the model follows"
+
+
+def test_an_error_of_averaged_samples_is_said_to_be_one():
+    lines = printed(replace(ANSWER, scoring=Scored("free_run", None, "it follows", 4))).splitlines()
+    errors = [line for line in lines if "NRMSE" in line]
+    assert len(errors) == 2
+    assert all("NRMSE (of means of 4 samples) 0.0" in line for line in errors)
+
+
+def test_where_nothing_is_missing_what_is_left_is_told_as_an_error_and_not_as_a_share_of_no_mismatch():
+    fit = {**ANSWER.fit, "refitted_nominal": FitQuality(2.2e-4, 1.5e-4)}
+    left = Remainder(1.0, True, "velocity", None)
+    moved = Scored("free_run", None, "the model follows", 1)
+    told = remainder_words(replace(ANSWER, verdict="consistent", remainder=left, fit=fit, scoring=moved))
+    assert told == "the model misses 0.015 % of the motion, part of which depends on velocity"
+    assert "100 % of the mismatch" in remainder_words(replace(ANSWER, verdict="undecided", remainder=left))
 
 
 def test_the_nominal_model_alone_has_no_probability():

@@ -1,11 +1,13 @@
 """The bar on the terminal shows what is known: what is under way, since when, and how much of a budget is spent."""
 
 import io
+import time
 
 import pytest
 from rich.console import Console
 from rich.progress import Progress
 
+from rhythmid import progress_bar
 from rhythmid.progress import counted
 from rhythmid.progress_bar import SpentColumn, progress, spent_words
 
@@ -67,3 +69,15 @@ def test_nothing_is_printed_where_there_is_no_log_and_no_terminal():
     with progress(console, log=False) as tell:
         tell("reading")
     assert isinstance(console.file, io.StringIO) and console.file.getvalue() == ""
+
+
+def test_a_step_that_takes_long_is_told_again_where_no_line_shows_the_time(monkeypatch):
+    monkeypatch.setattr(progress_bar, "SILENT", 0.02)
+    console = Console(file=io.StringIO(), width=120)
+    with progress(console) as tell:
+        tell("scoring the catalogue")
+        time.sleep(0.3)
+    assert isinstance(console.file, io.StringIO)
+    lines = console.file.getvalue().splitlines()
+    assert lines[0].endswith(" s  scoring the catalogue") and len(lines) > 1
+    assert all(line.endswith(" s  still scoring the catalogue") for line in lines[1:])

@@ -12,8 +12,8 @@ def scored(*statistics: float) -> Round:
     """A round in which elements of the catalogue have these statistics, each from two guesses."""
     scores = []
     for element, statistic in zip(load_catalogue().values(), statistics):
-        for guess, share in enumerate((1.0, 0.5)):
-            scores.append(Score(guess, element, {}, share * statistic, 1.0, {}))
+        for share in (1.0, 0.5):
+            scores.append(Score(element, {}, share * statistic, 1.0, {}))
     return Round(tuple(sorted(scores, key=lambda one: -one.statistic)), 1e-6)
 
 

@@ -41,6 +41,12 @@ def test_a_small_remainder_is_told_beside_names_that_stand() -> None:
     assert "The names stand all the same" in html
 
 
+def test_where_nothing_is_missing_the_remainder_is_told_as_an_error() -> None:
+    html = render(diagnosis_page(findings(result("consistent") | {"remainder": REMAINDER})))
+    assert "of the mismatch, by more than chance" not in html
+    assert "Nothing of practical size is left: the model misses 6 % of the motion." in html
+
+
 def test_the_remainder_s_curve_is_drawn_where_no_free_function_was_simulated() -> None:
     html = render(diagnosis_page(replace(findings(result() | {"remainder": REMAINDER}), functions=())))
     assert "What is left over velocity" in html

@@ -50,7 +50,7 @@ def by_difference(known: Trajectories, force: np.ndarray, share: float) -> np.nd
     fit, run = known.fit, known.disturbed
     rows = run.rows(fit.model, 0, fit.starts[0], first_order_hold(known.paths[0].time, share * force))
     assert rows is not None
-    return (rows[:, run.states] - known.outputs[0]) / share
+    return (rows[:, run.states] - known.paths[0].signal) / share
 
 
 def test_over_a_hundred_free_cycles_the_answer_is_that_to_a_tiny_force(swinging):

@@ -42,7 +42,7 @@ ANSWERED = Diagnosis(
     parameters={"linear_spring.stiffness": Estimate(200.0, 0.1, "N/m")},
     delays={"sum": {"value": 0.03, "std": None, "unit": "s"}, "separable": False},
     next_experiment="none",
-    scoring=Scored("effort", 12.0, "the effort was recorded"),
+    scoring=Scored("effort", 12.0, "the effort was recorded", 1),
 )
 
 
@@ -95,7 +95,7 @@ def test_the_contract_s_keys_are_in_every_answer(key):
             },
         ),
         ("Rejection", {"hypothesis", "name", "statistic", "threshold", "reason"}),
-        ("Scored", {"kind", "bandwidth", "reason"}),
+        ("Scored", {"kind", "bandwidth", "reason", "averaged"}),
     ],
 )
 def test_the_parts_of_an_answer_have_the_contract_s_keys(kept, keys):

@@ -57,7 +57,7 @@ def test_scores_are_those_of_changes_at_the_fit_that_the_noise_of_the_round_has_
         [one.statistic for one in again], rel=1e-6
     )
     best = best_changes(moved, changes_of(known, guesses(catalogue, moved.model, sizes_along(known))), 2)
-    assert [one.key for one in best] == [one.key for one in again[:2]]
+    assert [(one.element, one.values) for one in best] == [(one.element, one.values) for one in again[:2]]
 
 
 def test_a_resonance_that_no_candidate_knows_is_not_the_noise_s_colour():

@@ -117,4 +117,4 @@ def test_a_change_too_large_to_square_is_left_out_without_a_warning(monkeypatch)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         kept = list(changes_of(cast(Trajectories, None), [(element, {}), (element, {})]))
-    assert [one.key for one in kept] == [1]
+    assert [float(one.outputs[0][0]) for one in kept] == [1e3]

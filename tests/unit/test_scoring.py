@@ -12,6 +12,7 @@ from rhythmid.diagnose import diagnosis as module
 from rhythmid.diagnose import scoring
 from rhythmid.diagnose.answer.result import FitQuality
 from rhythmid.diagnose.diagnosis import Answer, diagnose
+from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.scoring import (
     DISTURBED_FREE_RUN,
     FOLLOWS,
@@ -22,6 +23,7 @@ from rhythmid.diagnose.scoring import (
     Scoring,
     settle,
 )
+from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import forgets
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
@@ -242,9 +244,10 @@ def asked(
     share: float,
     error: float = 0.2,
     follows: bool = False,
-    verdict="undecided",
+    verdict: Verdict = "undecided",
+    band_left_out: bool = False,
 ) -> list[str]:
-    """What is scored, in order, where nothing is named.
+    """What is scored, in order, where nothing is named. `verdict` is that of effort scoring, after which the motion leaves all undecided.
 
     `means` says whether a free run means something, `follows` whether the model then follows the machine, `share` is the effort's of the
     inertial force, `error` what is left of it.
@@ -254,7 +257,7 @@ def asked(
     def by_effort(*_) -> Answer:
         order.append("effort")
         fit = FitQuality(error, error)
-        found = diagnosed("undecided", kind="effort")
+        found = diagnosed(verdict, kind="effort")
         found = replace(found, fit={"refitted_nominal": fit, "augmented": fit})
         return Answer(found, hopper(), SimpleNamespace())  # type: ignore[arg-type]
 
@@ -262,7 +265,9 @@ def asked(
         order.append(scoring.kind)
         return SimpleNamespace(search=SimpleNamespace(fit=SimpleNamespace(model=hopper())))
 
-    effort = SimpleNamespace(applies=True, free_run_means_something=means, effort_share=share, notes=())
+    effort = SimpleNamespace(
+        applies=True, free_run_means_something=means, effort_share=share, notes=(), band_left_out=band_left_out
+    )  # fmt: skip
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
     monkeypatch.setattr(module, "_by_effort", by_effort)
     monkeypatch.setattr(
@@ -274,7 +279,7 @@ def asked(
     monkeypatch.setattr(module, "free_run", free_run)
     monkeypatch.setattr(module, "compose", lambda *_: diagnosed("undecided", kind=order[-1]))
     found = diagnose(records(hopper(), SHORT[2:]), hopper(), catalogue=CATALOGUE).diagnosis
-    assert found.scoring.kind == order[0]
+    assert found.scoring.kind == order[-1 if verdict == "consistent" else 0]
     return order
 
 
@@ -282,7 +287,42 @@ def asked(
 def test_windows_are_tried_where_the_effort_is_left_by_more_than_models_of_real_machines_leave(
     monkeypatch, left, expected
 ):
-    assert asked(monkeypatch, False, 2.0, left) == expected
+    assert asked(monkeypatch, False, 2.0, left, verdict="consistent") == expected
+
+
+@pytest.mark.parametrize(
+    ("verdict", "share", "expected"),
+    [
+        ("undecided", 2.0, ["effort", "windows"]),
+        ("unknown_physics", 2.0, ["effort", "windows"]),
+        ("undecided", 20.0, ["effort"]),  # quasi-static: its motion tells less
+    ],
+)
+def test_windows_are_tried_where_the_effort_leaves_something_without_a_name_however_little(
+    monkeypatch, verdict, share, expected
+):
+    assert asked(monkeypatch, False, share, 0.02, verdict=verdict) == expected
+
+
+@pytest.mark.parametrize(("share", "expected"), [(2.0, ["windows", "effort"]), (20.0, ["effort"])])
+def test_windows_come_first_where_a_band_of_the_effort_cannot_be_compared(monkeypatch, share, expected):
+    assert asked(monkeypatch, False, share, 0.02, band_left_out=True) == expected
+
+
+def test_the_effort_is_scored_where_no_window_serves_although_those_come_first(monkeypatch):
+    def fails(*_):
+        raise InputError("the records are too short")
+
+    found = diagnosed("undecided", kind="effort")
+    effort = SimpleNamespace(
+        applies=True, free_run_means_something=True, effort_share=0.5, notes=(), band_left_out=False
+    )  # fmt: skip
+    monkeypatch.setattr(module, "applicable", lambda *_: effort)
+    monkeypatch.setattr(module, "settle", lambda *given: fails() if given[-1] else [])
+    monkeypatch.setattr(module, "_by_effort", lambda *_: Answer(found, hopper(), SimpleNamespace()))  # type: ignore[arg-type]
+    answer = diagnose(records(hopper(), SHORT[2:]), hopper(), catalogue=CATALOGUE).diagnosis
+    assert answer.scoring.kind == "effort"
+    assert [one.reason for one in answer.excluded] == ["the records are too short"]
 
 
 @pytest.mark.parametrize(("share", "expected"), [(1.5, ["effort", "windows"]), (0.5, ["windows", "effort"])])

@@ -144,3 +144,25 @@ def test_a_disturbance_at_the_frequency_of_a_free_motion_is_another_damping_or_s
     free = replace(SIZES, forcing_frequency=0.0, idle=True)
     values = {"amplitude": 0.1, "frequency": free.frequency + apart / free.duration}
     assert (shape("periodic_disturbance", values, sizes=free)["own_frequency"] < 1.0) is same
+
+
+@pytest.mark.parametrize(("ratio", "edge"), [(100.0, True), (1.0, True), (1.5, False), (20.0, False)])
+def test_a_stribeck_friction_without_kinetic_friction_or_without_a_rise_is_something_else(ratio, edge):
+    stribeck = CATALOGUE["stribeck_friction"].within(SIZES)
+    values = {"force": 0.1, "static_ratio": ratio, "stribeck_speed": 0.02, "transition": 0.002}
+    assert (shape("stribeck_friction", values, element=stribeck)["within_bounds"] < EDGE) is edge
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("coulomb_friction", {"force": 1.0, "transition": 0.002}),
+        ("cubic_stiffness", {"coefficient": 1e4}),
+        ("stiffness_jump", {"change": 0.1, "time": 5.0}),
+    ],
+)
+def test_an_effect_without_a_size_is_the_model_without_it(name, values):
+    absent = {**values, CATALOGUE[name].size: 0.0}
+    element = CATALOGUE[name].within(SIZES)
+    assert shape(name, values, element=element)["within_bounds"] > EDGE
+    assert shape(name, absent, element=element)["within_bounds"] == 0.0

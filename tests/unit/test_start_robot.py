@@ -125,6 +125,14 @@ def test_a_current_gets_a_check_of_its_unit(tmp_path, robot, run):
         assert ("# CHECK effort: i* is called a current" in found.signals) == doubted
 
 
+def test_a_force_comes_before_a_current_unless_it_never_acts(tmp_path, robot, run):
+    heads = ["q1", "q2", "current_1", "current_2", "effort_1", "effort_2"]
+    for size, taken in ((1.0, "effort_*"), (0.0, "current_*")):
+        both = {**run, "force": size * run["effort"]}
+        found = begun(table(tmp_path / "run.csv", both, heads, "position", "effort", "force"), robot)
+        assert f'effort: {{column: "{taken}"' in found.signals
+
+
 def test_efforts_with_other_numbers_than_the_positions_are_refused_with_how_to_go_on(tmp_path, robot, run):
     path = table(tmp_path / "run.csv", run, ["q0", "q1", "tau1", "tau2"], "position", "effort")
     with pytest.raises(

@@ -54,6 +54,24 @@ def test_an_effort_command_of_any_type_is_the_input_of_the_joint_that_moves_most
     assert "joint: knee" in text and "hip (" in text
 
 
+@pytest.mark.parametrize(("name", "unit"), [("cyl", "N"), ("knee", "N*m")])
+def test_a_measured_force_says_that_a_joint_slides_before_the_topic_does_and_after_the_joint_s_name(
+    tmp_path, name, unit
+):
+    """Every robot's topic is called joint_states."""
+    topics = {
+        "/axis/joint_states": [
+            (NOW + TIME[k] + 2e-4, joint_state(NOW + TIME[k], [name], position=[X[k]])) for k in ROWS
+        ],
+        "/axis/load_cell": [
+            (NOW + TIME[k] + 1e-4, foreign.wrench(NOW + TIME[k], float(FORCE[k]), 0.0)) for k in ROWS
+        ],
+    }
+    found = guess(foreign.write(tmp_path / "bag", topics))
+    assert found.roles.rotary == (unit == "N*m")
+    assert f'unit: "{unit}"' in found.signals
+
+
 def test_a_joint_may_be_asked_for_and_one_that_is_not_there_is_refused(tmp_path):
     command = two_joints(lambda k: joint_state(NOW + TIME[k], ["hip", "knee"], effort=[OTHER[k], FORCE[k]]))
     bag = foreign.write(tmp_path / "bag", command)

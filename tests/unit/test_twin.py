@@ -1,6 +1,7 @@
 """The live twin: it follows a healthy machine in silence, and tells a change of physics with its slot and size."""
 
 import json
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.record.convert import write_record
+from rhythmid.record.outlier import outlying_samples
 from rhythmid.record.record import Channel, Record
 from rhythmid.twin.calibration import Calibration
 from rhythmid.twin.changes import Change, watched, without_own_forcing
@@ -22,6 +24,7 @@ from rhythmid.twin.detector import Healthy
 from rhythmid.twin.diagnosis import Diagnosing
 from rhythmid.twin.isolation import isolate
 from rhythmid.twin.kept import load, save
+from rhythmid.twin.outliers import WithoutOutliers
 from rhythmid.twin.samples import Samples
 from rhythmid.twin.score import Score, inverse
 from rhythmid.twin.settings import Settings
@@ -166,6 +169,51 @@ def test_what_is_said_does_not_depend_on_how_the_samples_come_in():
     whole = feed(Twin(model(), SETTINGS, calibration=calibration), later, 10_000)
     bits = feed(Twin(model(), SETTINGS, calibration=calibration), later, 37)
     assert [status.mismatch for status in bits] == [status.mismatch for status in whole]
+
+
+def with_outliers(signals: Stretch, every: int) -> Stretch:
+    """The signals with a value far off at every so many measurements."""
+    measured = signals.measured.copy()
+    measured[every // 2 :: every] += 10.0 * np.ptp(measured)
+    return replace(signals, measured=measured)
+
+
+def test_outliers_of_the_measurement_are_left_out_and_counted_however_they_come_in():
+    calibration, signals = learnt()
+    clean = at_work(model(), signals.time[-1], signals.time[-1] + 8.0, signals.end, seed=1)
+    spoilt = with_outliers(clean, 300)
+    twin = Twin(model(), SETTINGS, calibration=calibration)
+    whole, bits = (
+        feed(twin, spoilt, 10_000),
+        feed(Twin(model(), SETTINGS, calibration=calibration), spoilt, 37),
+    )
+    assert bits == whole
+    assert {one.level for one in whole} == {"learning", "ok"}
+    assert max(one.innovation for one in whole) < 1.5
+    judged = np.sum(spoilt.stamp[150::300] < whole[-1].time)
+    assert judged <= twin.outliers <= len(spoilt.stamp[150::300])
+
+
+def test_a_healthy_stretch_is_cleaned_of_outliers_by_the_criterion_of_the_records():
+    rng = np.random.default_rng(2)
+    time = np.arange(3000) / 200.0 + 5e4
+    value = np.sin(3.0 * time) + 1e-3 * rng.standard_normal(3000)
+    value[rng.choice(np.arange(5, 2900, 7), 25, replace=False)] += 0.5
+    expected = outlying_samples(value)
+    filtered = WithoutOutliers()
+    kept = []
+    for first in range(0, 3000, 11):
+        filtered.given.append(time[first : first + 11], value[first : first + 11])
+        kept.append(filtered.take()[0])
+    told = np.concatenate(kept)
+    assert filtered.left_out == expected.sum() == 25
+    assert np.array_equal(told, time[~expected][: len(told)]) and len(told) > 2900
+
+
+def test_peaks_of_an_acceleration_are_kept():
+    filtered = WithoutOutliers(keep=True)
+    filtered.given.append(np.arange(300.0), np.where(np.arange(300) == 150, 9.0, 0.0))
+    assert len(filtered.take()[0]) == 300 and filtered.left_out == 0 and len(filtered.take()[0]) == 0
 
 
 def test_a_calibration_is_read_back_as_it_was_written(tmp_path):

@@ -2,7 +2,7 @@
 
 import glob
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from itertools import product
@@ -35,7 +35,7 @@ class Task:
     group : the rig, or what else recordings are compared by.
     sources, holdout : recordings to analyse, and held-out recordings.
     model, signals, joint, elements : as for the command; `machine` if the model has several joints.
-    labels : names of model and signals in the manifest.
+    labels : names of model and signals in the manifest; their paths where one name stands for different files.
     key : digest of everything on which the answer depends.
     """
 
@@ -83,7 +83,36 @@ def tasks_of(manifest: Manifest) -> tuple[Task, ...]:
             if task.key in found:
                 settled.place.fail(f"asks for {task.name} a second time, with the same files and options")
             found[task.key] = task
-    return _named(tuple(found.values()))
+    return _named(_distinct(tuple(found.values()), manifest.folder))
+
+
+def _distinct(tasks: tuple[Task, ...], folder: Path) -> tuple[Task, ...]:
+    """The tasks with different labels for different models and signals, whatever their files are called."""
+    models = _by_content([(task.labels[0], task.model, task.machine) for task in tasks], folder)
+    signals = _by_content([(task.labels[1], task.signals, False) for task in tasks], folder)
+    return tuple(replace(task, labels=pair) for task, pair in zip(tasks, zip(models, signals)))
+
+
+def _by_content(named: Sequence[tuple[str, Path | None, bool]], folder: Path) -> list[str]:
+    """A label for each named file: its name, or its path where the name is that of files of different content.
+
+    A name that the manifest gives a file remains: it says which files are to be taken for the same. A model of several joints
+    refers to other files by paths relative to its own, so that its path counts, not its content.
+    """
+    known: dict[str, dict[object, Path]] = {}
+    contents: list[object] = []
+    read_bytes = lru_cache(maxsize=None)(Path.read_bytes)
+    for name, path, whole in named:
+        content = None if path is None else path.resolve() if whole else read_bytes(path)
+        contents.append(content)
+        if path is not None and name == path.stem:
+            known.setdefault(name, {}).setdefault(content, path)
+    return [
+        relpath(known[name][content], folder)
+        if len(known.get(name, ())) > 1 and content in known[name]
+        else name
+        for (name, _, _), content in zip(named, contents)
+    ]
 
 
 def _named(tasks: tuple[Task, ...]) -> tuple[Task, ...]:

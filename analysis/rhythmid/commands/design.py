@@ -13,6 +13,7 @@ from rhythmid.output import require_new, write_json
 
 EXAMPLES = (
     "rhythmid design model.yaml --duration 60 --band 0 7 --max-effort 0.02 --envelope 0.13 0.17 --noise-std 1e-5 --output plan",
+    "rhythmid design axis.yaml --no-forcing --duration 20 --band 0.2 5 --max-effort 25 --envelope -0.1 0.1 --noise-std 1e-5 --output plan",
     "rhythmid design leg.yaml --duration 20 --band 0.2 5 --max-effort 25 --noise-std 0.05 --output plan",
 )
 
@@ -67,6 +68,9 @@ def design(
             help="Amplitude in N and frequency in Hz of the forcing on the robot; by default the model's, else 1 1, with a note.",
         ),
     ] = None,
+    no_forcing: Annotated[
+        bool, typer.Option("--no-forcing", help="No forcing acts: the machine rests without a command.")
+    ] = False,
     delays: Annotated[
         tuple[float, float] | None,
         typer.Option("--delays", help="Expected input and measurement delay in s; the model's by default."),
@@ -118,7 +122,7 @@ def design(
         "period": period, "spacing": spacing,
     }  # fmt: skip
     if machines.is_machine(model):
-        machines.refuse(forcing=forcing, delays=delays, **of_one_axis)
+        machines.refuse(forcing=forcing, no_forcing=no_forcing, delays=delays, **of_one_axis)
         from rhythmid.design.joint_design import JointRequirements
 
         of_joints = JointRequirements(duration, band, max_effort, noise_std, rate, envelope, seed)
@@ -140,7 +144,7 @@ def design(
     known = Model.load(model, catalogue)
     wanted = Requirements.of(
         known, duration, band, max_effort, envelope, noise_std, rate=rate, delays=delays, seed=seed,
-        forcing=None if forcing is None else Forcing(*forcing),
+        forcing=None if forcing is None else Forcing(*forcing), unforced=no_forcing,
         **{name: value for name, value in of_one_axis.items() if value is not None},
     )  # fmt: skip
     with progress(terminal.progress, log=False) as tell:

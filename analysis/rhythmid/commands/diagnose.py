@@ -64,8 +64,8 @@ def diagnose(
         typer.Option(
             "--budget",
             metavar="SECONDS",
-            help="Wall-clock time in which an answer is due: 70 % of it for the search, the rest for what weighs its results; "
-            "the answer says what was not tried.",
+            help="Wall-clock time in which an answer is due: 60 % of it for the search, the rest for what weighs its results; "
+            "the answer says what was not tried. A --report takes longer.",
         ),
     ] = None,
     quiet: Quiet = False,
@@ -133,12 +133,14 @@ def diagnose(
         from rhythmid.diagnose.answer.present import present, present_comparison
         from rhythmid.report.page import write_page
 
-        if answer is not None and nominal is not None and model is not None:
-            page = present(answer, nominal, records, unseen, command_line(), model.name, comparison)
-        else:
-            assert comparison is not None and simulation is not None
-            page = present_comparison(comparison, simulation, records, command_line())
-        write_page(report, page)
+        with progress(terminal.progress) as tell:
+            tell("drawing the report")
+            if answer is not None and nominal is not None and model is not None:
+                page = present(answer, nominal, records, unseen, command_line(), model.name, comparison)
+            else:
+                assert comparison is not None and simulation is not None
+                page = present_comparison(comparison, simulation, records, command_line())
+            write_page(report, page)
         terminal.say(f"report: {report}")
 
 

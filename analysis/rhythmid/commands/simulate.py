@@ -43,5 +43,7 @@ def simulate(
         tell("writing the bag")
         found.save(out, all_topics)
     terminal.say(f"{out}: {found.headline} of {', '.join(found.topics(all_topics))}")
+    for note in found.experiment.notes:
+        terminal.say(f"note: {note}")
     if json is not None:
         write_json(json, {"path": str(out), **found.to_dict()})

@@ -109,6 +109,8 @@ def watch(
             console.print(f"  diagnosis: {escape(event.diagnosis['summary'])}")
     if not watching.events.found:
         console.print(f"[green]no mismatch[/] in {result['watched']:.0f} s")
+    if left_out := result["outliers"]:
+        console.print(f"{left_out} samples of the output that stand far off their neighbours are left out")
     console.print(
         f"innovations are {number(100.0 * result['nrmse'], 2)} % of the motion in healthy operation; "
         f"{false_alarms:g} false alarms a day are allowed"
@@ -141,6 +143,7 @@ class _Told:
             "watched": self._watched,
             "level": None if self._last is None else self._last.level,
             "nrmse": None if calibration is None else calibration.nrmse,
+            "outliers": self._watching.twin.outliers,
             "events": [event.to_dict() for event in self._watching.events.found],
             "delays": {key: {"value": one.value, "std": one.std, "unit": "s"} for key, one in delays.items()},
         }

@@ -55,9 +55,10 @@ def largest_amplitude(
 
     least, most = reach(0.0)
     if least - margin < low or most + margin > high:
+        forced = requirements.forced
         raise InputError(
-            f"the limit cycle itself, measured with its noise, spans {least - margin:.6g} to {most + margin:.6g} and leaves the "
-            f"envelope {low:g} to {high:g}; widen --envelope or lessen the forcing"
+            f"{'the limit cycle itself' if forced else 'the position at rest'}, measured with its noise, spans {least - margin:.6g} to "
+            f"{most + margin:.6g} and leaves the envelope {low:g} to {high:g}; widen --envelope{' or lessen the forcing' if forced else ''}"
         )
     largest = requirements.max_effort
     found = limit(largest)

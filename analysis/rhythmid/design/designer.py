@@ -1,7 +1,7 @@
 """Design an experiment: a signal with separable responses, as large as the machine allows, and its predicted accuracy."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,12 +87,17 @@ class Design(Result):
     def notes(self) -> tuple[str, ...]:
         """Notes for the user, one line each."""
         found = []
+        if not self.requirements.forced:
+            found.append(
+                "without forcing only the sum of the two delays acts on the record: it is predicted as the input delay, and the "
+                "measurement delay is fixed"
+            )
         if self.requirements.forcing_assumed:
             forcing = self.requirements.forcing
             found.append(
-                f"the model has no forcing: one of {forcing.amplitude:g} {self.experiment.model.units.force} at {forcing.frequency:g} Hz is "
+                f"the model has no forcing: one of {forcing.amplitude:g} N at {forcing.frequency:g} Hz is "
                 "assumed and part of the plan. The prediction, that of the two delays above all, holds only if it acts during the run; "
-                "state it with --forcing"
+                "state it with --forcing, or --no-forcing where there is none"
             )
         if self.distortion.total > STRONG:
             found.append(
@@ -206,6 +211,12 @@ def with_delays(model: Model, requirements: Requirements, catalogue: Catalogue) 
     return model
 
 
+def _with_sum_of_delays(model: Model) -> Model:
+    """The model with a fixed measurement delay: without a limit cycle only the sum of both delays has an effect."""
+    late = model.parameters[MEASUREMENT_DELAY]
+    return model.with_parameters({MEASUREMENT_DELAY: replace(late, fixed=True)})
+
+
 def planned_experiment(model: Model, command: Waveform, requirements: Requirements) -> Experiment:
     """The run of this command in simulated time, as the experiment file will describe it."""
     return Experiment(
@@ -256,22 +267,26 @@ def design(
     machine = with_delays(model, requirements, load_catalogue() if catalogue is None else catalogue)
     forcing = requirements.forcing
     pumping = Pumping.cosine(forcing.amplitude, forcing.frequency, forcing.phase)
-    told("finding the limit cycle")
+    if not requirements.forced:
+        machine = _with_sum_of_delays(machine)
+    told("finding the limit cycle" if requirements.forced else "finding the rest position")
     plain = without_forcing(machine).with_values(dict.fromkeys(DELAYS, 0.0))
     linear = linearised(plain, pumping)
     ring_down = linear.cycle.ring_down
     if not np.isfinite(ring_down):
         raise InputError(
-            "the limit cycle is not stable: a command would not die out, and no run is long enough"
+            f"the {'limit cycle' if requirements.forced else 'rest position'} is not stable: a command would not die out, and no run "
+            "is long enough"
         )
-    require_unambiguous_delays(linear.cycle, requirements.longest_delay)
+    if requirements.forced:
+        require_unambiguous_delays(linear.cycle, requirements.longest_delay)
     if requirements.kind == "comb":
         plan = chirp_comb(requirements, ring_down)
     else:
         plan = interleaved_multisine(requirements, ring_down, progress)
     shape = sampled(plan.excitation, requirements.duration, requirements.rate)
     settled = round(plan.lead_in * requirements.rate)
-    told("simulating the limit cycle over the run")
+    told("simulating the run without a command")
     rehearsal = Rehearsal(planned_experiment(machine, shape, requirements), shape)
     amplitude = largest_amplitude(rehearsal, requirements, settled, progress)
     command = shape.with_peak(amplitude.peak)
@@ -282,8 +297,9 @@ def design(
     bent = distortion(rehearsal, amplitude.peak, settled)
     record = prediction.record
     density = requirements.noise_std**2 / requirements.rate
+    seen = visible_sidebands(record, plain, pumping, density, LOOKED_AT) if requirements.forced else ()
     return Design(
         requirements, plan, command, amplitude, experiment, linear, prediction, bent,
-        linearised_bias(prediction.fit, bent.signal), visible_sidebands(record, plain, pumping, density, LOOKED_AT),
+        linearised_bias(prediction.fit, bent.signal), seen,
         rehearsal.output(amplitude.peak), rehearsal.output(0.0),
     )  # fmt: skip

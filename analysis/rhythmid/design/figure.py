@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 from rhythmid.design.designer import Design
 
 Array = NDArray[np.float64]
-SHOWN_PERIODS = 4  # forcing periods over which the motion is drawn
+SHOWN_PERIODS = (
+    4  # periods of the forcing, or of the middle of the band without forcing, over which the motion is drawn
+)
 CYCLES = (
     60  # periods of the highest frequency over which the command is drawn; more could not be distinguished
 )
@@ -26,13 +28,15 @@ def _over_window(design: Design, signal: Array) -> Array:
 
 
 def _harmonics(axis: Axes, design: Design) -> None:
-    """Vertical lines at the harmonics of the forcing; the axis ends at the last response."""
-    top = design.requirements.band[1] + design.requirements.harmonics * design.requirements.forcing.frequency
-    frequency = design.requirements.forcing.frequency
-    for n in range(1, int(top / frequency) + 1):
-        axis.axvline(n * frequency, color="tab:red", alpha=0.25, linewidth=0.8)
+    """Vertical lines at the harmonics of the forcing, if any; the axis ends at the last response."""
+    wanted = design.requirements
+    top = wanted.band[1] + wanted.harmonics * wanted.grid
     axis.set_xlim(0.0, top)
-    axis.set_xlabel("frequency [Hz]; red: harmonics of the forcing")
+    axis.set_xlabel(f"frequency [Hz]{'; red: harmonics of the forcing' if wanted.forced else ''}")
+    if not wanted.forced:
+        return
+    for n in range(1, int(top / wanted.grid) + 1):
+        axis.axvline(n * wanted.grid, color="tab:red", alpha=0.25, linewidth=0.8)
 
 
 def draw_command(axis: Axes, design: Design) -> None:
@@ -55,13 +59,18 @@ def draw_command(axis: Axes, design: Design) -> None:
 
 
 def _motion(axis: Axes, design: Design) -> None:
-    rate = design.requirements.rate
+    wanted, rate = design.requirements, design.requirements.rate
     far = int(np.argmax(np.abs(design.output - np.median(design.output))))
-    half = round(0.5 * SHOWN_PERIODS / design.requirements.forcing.frequency * rate)
+    half = round(0.5 * SHOWN_PERIODS / (wanted.grid if wanted.forced else 0.5 * sum(wanted.band)) * rate)
     first = int(np.clip(far - half, 0, max(0, len(design.output) - 2 * half)))
     shown = slice(first, first + 2 * half)
     time = np.arange(len(design.output)) / rate
-    axis.plot(time[shown], design.still[shown], color="0.6", label="limit cycle")
+    axis.plot(
+        time[shown],
+        design.still[shown],
+        color="0.6",
+        label="limit cycle" if wanted.forced else "without command",
+    )
     axis.plot(time[shown], design.output[shown], color="tab:blue", linewidth=1.0, label="with command")
     reach = design.amplitude.high - design.amplitude.low
     for end in design.requirements.envelope:

@@ -26,7 +26,7 @@ FEWEST_LINES = 4  # minimum number of lines
 
 def _pumping_periods(requirements: Requirements, ring_down: float) -> tuple[int, int]:
     """Even number P of pumping periods in the multisine's period, and its repeats. Raises InputError where none fits."""
-    frequency = requirements.forcing.frequency
+    frequency = requirements.grid
     available = (requirements.duration - lead_in(requirements, ring_down)) * frequency
     least = 2 * math.ceil(0.5 * shortest_repeat(ring_down) * frequency)
     if requirements.period is not None:
@@ -35,8 +35,8 @@ def _pumping_periods(requirements: Requirements, ring_down: float) -> tuple[int,
         if abs(exact - periods) > 1e-6 or periods % 2 or periods < 2:
             near = max(2, 2 * round(0.5 * exact)) / frequency
             raise InputError(
-                f"--period {requirements.period:g} s aliases: it does not hold an even number of forcing periods of "
-                f"{1.0 / frequency:g} s, so sidebands fall between the lines or on them; the nearest that does is {near:g} s"
+                f"--period {requirements.period:g} s aliases: it does not hold an even number of "
+                f"{'forcing periods' if requirements.forced else 'pairs of samples'} of {1.0 / frequency:g} s, so sidebands fall between the lines or on them; the nearest that does is {near:g} s"
             )
         repeats = math.floor(available / periods + 1e-9)
         needed = periods
@@ -103,7 +103,7 @@ def interleaved(requirements: Requirements, ring_down: float) -> Interleaving:
     Raises InputError when the run is too short, or when responses would coincide.
     """
     periods, repeats = _pumping_periods(requirements, ring_down)
-    period = periods / requirements.forcing.frequency
+    period = periods / requirements.grid
     low = max(1, math.ceil(requirements.band[0] * period - 1e-9))
     high = math.floor(requirements.band[1] * period + 1e-9)
     harmonics = requirements.harmonics
@@ -134,7 +134,7 @@ def interleaved_multisine(
 ) -> SignalPlan:
     """The multisine of these lines with a small crest factor. Raises InputError as `interleaved` does."""
     made = interleaved(requirements, ring_down)
-    lines, period = made.lines, made.periods / requirements.forcing.frequency
+    lines, period = made.lines, made.periods / requirements.grid
     weights = np.ones(len(lines))
     _, phases = least_crest(lines, weights, requirements.seed, progress)
     sine = Multisine(

@@ -18,18 +18,21 @@ def show(result: Mapping[str, Any], console: Console) -> None:
         f"(limit: {size['limited_by']}), rms {size['rms']:.4g}, crest factor {size['crest_factor']:.2f}"
     )
     forcing = result["forcing"]
+    forced = forcing["amplitude"] != 0.0
     console.print(
         f"forcing of {forcing['amplitude']:g} {size['unit']} at {forcing['frequency']:g} Hz, part of the plan: the machine moves in "
         "the limit cycle that it causes"
+        if forced
+        else "no forcing: without a command the machine rests"
     )
     low, high = position["cycle"]
     console.print(
-        f"position {position['low']:.6g} to {position['high']:.6g} {position['unit']}, the limit cycle alone {low:.6g} to "
-        f"{high:.6g}"
+        f"position {position['low']:.6g} to {position['high']:.6g} {position['unit']}, "
+        f"{'the limit cycle alone' if forced else 'without command'} {low:.6g} to {high:.6g}"
     )
+    apart = f"; harmonics up to ±{signal['harmonics']} stay apart" if forced else ""
     console.print(
-        f"repeats over {signal['window']:.6g} s after a lead-in of {signal['lead_in']:.4g} s; harmonics up to "
-        f"±{signal['harmonics']} stay apart"
+        f"repeats over {signal['window']:.6g} s after a lead-in of {signal['lead_in']:.4g} s{apart}"
     )
     console.print(f"distortion of the response: even {bent['even']:.2%}, odd {bent['odd']:.2%}")
     for note in result["notes"]:

@@ -8,6 +8,7 @@ from rhythmid.errors import InputError
 from rhythmid.ltp.htf import transport_delays
 from rhythmid.model import Model
 from rhythmid.settings import Forcing
+from rhythmid.unstated_forcing import NO_FORCING, forcing_of
 
 Kind = Literal["comb", "multisine"]
 KINDS: tuple[Kind, ...] = ("comb", "multisine")
@@ -34,9 +35,9 @@ class Requirements:
     rate
         Samples per second [Hz].
     harmonics
-        M: the responses at ω + mω_p, |m| ≤ M, must not coincide.
+        M: the responses at ω + mω_p, |m| ≤ M, must not coincide; 0 without forcing.
     forcing
-        Periodic force made on the robot.
+        Periodic force made on the robot. An amplitude of 0 with `harmonics` 0 means a machine without forcing.
     input_delay, measurement_delay
         Expected delays [s].
     longest_delay
@@ -50,7 +51,7 @@ class Requirements:
     seed
         Seed of the random phases.
     forcing_assumed
-        Whether neither the model nor the user states the forcing.
+        Whether neither the model nor the user states the forcing, and one acts.
 
     Raises
     ------
@@ -77,6 +78,16 @@ class Requirements:
     seed: int = 0
     forcing_assumed: bool = False
 
+    @property
+    def forced(self) -> bool:
+        """Whether a forcing acts, so that the machine moves in a limit cycle."""
+        return self.forcing.amplitude != 0.0
+
+    @property
+    def grid(self) -> float:
+        """Frequency [Hz] an even number of whose periods is the period of a multisine: that of the forcing, or else half the rate."""
+        return self.forcing.frequency if self.forced else 0.5 * self.rate
+
     @classmethod
     def of(
         cls,
@@ -88,10 +99,13 @@ class Requirements:
         noise_std: float,
         *,
         forcing: Forcing | None = None,
+        unforced: bool = False,
         delays: tuple[float, float] | None = None,
         **further: Any,
     ) -> "Requirements":
         """Requirements whose forcing and delays are the model's own where they are not given.
+
+        Where neither states a forcing, 1 N at 1 Hz is assumed for a machine in N and m, and none for any other.
 
         Parameters
         ----------
@@ -101,12 +115,27 @@ class Requirements:
             The attributes of these names.
         delays
             Of command and measurement, as expected [s].
+        unforced
+            Whether no forcing acts on the machine.
+
+        Raises
+        ------
+        InputError
+            For a forcing of a machine that is said to have none.
         """
+        own, assumed = forcing_of(model)
+        if unforced:
+            if forcing is not None or model.term("periodic_forcing") is not None:
+                raise InputError("--no-forcing contradicts the model's periodic_forcing or --forcing")
+            forcing = NO_FORCING
+        assumed = assumed and forcing is None
+        unforced = unforced or (forcing is None and own == NO_FORCING)
+        if unforced:
+            further = {"harmonics": 0} | further
         late = transport_delays(model) if delays is None else delays
         return cls(
             duration, band, max_effort, envelope, noise_std, input_delay=late[0], measurement_delay=late[1],
-            forcing=forcing_of(model) if forcing is None else forcing,
-            forcing_assumed=forcing is None and model.term("periodic_forcing") is None, **further,
+            forcing=own if forcing is None else forcing, forcing_assumed=assumed, **further,
         )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -130,11 +159,16 @@ class Requirements:
             raise InputError(
                 f"--max-distortion {self.max_distortion:g}: a share of the response greater than 0 is expected"
             )
-        if self.rate < 1 or self.harmonics < 1:
+        if self.rate < 1 or self.harmonics < (1 if self.forced else 0):
             raise InputError("--rate and --harmonics are whole numbers greater than 0")
-        if self.forcing.amplitude == 0.0 or not self.forcing.frequency > 0.0:
+        if not self.forced and self.harmonics > 0:
             raise InputError(
-                "without forcing there is no limit cycle to excite about; give --forcing AMPLITUDE FREQUENCY"
+                "without forcing there is no limit cycle to excite about; give --forcing AMPLITUDE FREQUENCY, or --no-forcing "
+                "for a machine that rests without a command"
+            )
+        if not self.forced and self.kind == "comb":
+            raise InputError(
+                "--kind comb shifts its chirps along the forcing; without forcing use --kind multisine"
             )
         for name, value in (("input", self.input_delay), ("measurement", self.measurement_delay)):
             if not 0.0 <= value <= self.longest_delay:
@@ -158,15 +192,9 @@ class Requirements:
             raise InputError(
                 f"--band up to {high:g} Hz aliases: at {self.rate} Hz nothing beyond {nyquist:g} Hz is sampled"
             )
-        top = high + self.harmonics * self.forcing.frequency
+        top = high + self.harmonics * self.grid
         if top >= nyquist:
             raise InputError(
                 f"sideband +{self.harmonics} of {high:g} Hz lies at {top:g} Hz and aliases: at {self.rate} Hz nothing beyond "
                 f"{nyquist:g} Hz is sampled; lower --band or --harmonics, or raise --rate"
             )
-
-
-def forcing_of(model: Model) -> Forcing:
-    """The model's own forcing where it has one, else the paper's."""
-    term = model.term("periodic_forcing")
-    return Forcing() if term is None else Forcing(**term.numbers)

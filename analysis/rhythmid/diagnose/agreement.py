@@ -8,10 +8,8 @@ from rhythmid.diagnose.hypothesis import ScoringKind, Verdict
 from rhythmid.report.quantity import in_words
 
 HOW: Mapping[ScoringKind, str] = {"free_run": "in free run", "windows": "in windows", "effort": "by effort"}
-OPEN: tuple[Verdict, ...] = (
-    "undecided",
-    "unknown_physics",
-)  # verdicts that neither state a name nor deny a mismatch
+# verdicts that neither state a name nor deny a mismatch
+UNSETTLED: tuple[Verdict, ...] = ("undecided", "unknown_physics")
 DOUBTED = "Believe neither without another experiment."
 
 
@@ -23,7 +21,7 @@ def contradictions(chosen: int, made: Sequence[Diagnosis]) -> tuple[str, ...]:
     """
     found = made[chosen]
     stands = found.verdict == "missing_physics"
-    weaker = [one for one in made[chosen + 1 :] if not (stands and one.verdict in OPEN)]
+    weaker = [one for one in made[chosen + 1 :] if not (stands and one.verdict in UNSETTLED)]
     told = [_difference(found, other) for other in (*made[:chosen], *weaker)]
     return tuple(one for one in told if one is not None)
 

@@ -81,13 +81,13 @@ def alternatives(
         "effects": [*kin, *_reduced(chosen, weighed)],
     }
     kept: dict[tuple[str, ...], tuple[Proposal, Kind]] = {
-        tuple(sorted(one.added)): (one, kind) for kind, group in made.items() for one in group
+        one.key: (one, kind) for kind, group in made.items() for one in group
     }
     if not kept:
         return []
     given = [one for one, _ in kept.values()]
     trials, _ = run_trials(given, series, Origin.of(chosen), noise, step, reach=reach, tell=tell)
-    return [(trial, kept[tuple(sorted(trial.added))][1]) for trial in trials]
+    return [(trial, kept[trial.key][1]) for trial in trials]
 
 
 def _reduced(chosen: Trial, weighed: Sequence[Trial]) -> Iterator[Proposal]:
@@ -95,7 +95,7 @@ def _reduced(chosen: Trial, weighed: Sequence[Trial]) -> Iterator[Proposal]:
 
     One effect may carry the whole gain, but the fit may have found its deepest minimum only beside another effect.
     """
-    known = {tuple(sorted(trial.added)) for trial in weighed}
+    known = {trial.key for trial in weighed}
     for trial in weighed:
         if len(trial.added) < 2 or trial.chi2 >= chosen.chi2:
             continue

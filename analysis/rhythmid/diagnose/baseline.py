@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhythmid.deadline import time_is_up
-from rhythmid.diagnose.constants import EARLIEST, FOLLOWS, LATEST, NOT_HELD, NOT_HELD_LEAST, STANDS_IN
+from rhythmid.diagnose.constants import FOLLOWS, LATEST, NOT_HELD, NOT_HELD_LEAST, STANDS_IN
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.early_output import EARLIEST
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.record_scales import REST_LENGTH
@@ -70,16 +71,6 @@ def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) ->
     return model.with_parameters({INPUT_DELAY: nuisance})
 
 
-def causal(model: Model) -> Model:
-    """The model with a slightly negative delay set to zero: a causal machine does not respond before the command."""
-    current = model.parameters.get(INPUT_DELAY)
-    if current is None or current.bounds[0] >= 0.0:
-        return model
-    return model.with_parameters(
-        {INPUT_DELAY: replace(current, value=max(current.value, 0.0), bounds=(0.0, current.bounds[1]))}
-    )
-
-
 def _shooting_start(model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Model:
     """Start values from short windows with initial states of their own, in which wrong values cannot drift far."""
     length = 2.0 / max(dominant_frequency(one) for one in series)
@@ -120,9 +111,7 @@ def calibrate(
     if best is None or ((best.nrmse() > SETTLED or not best.converged) and not time_is_up()):
         try:
             again = estimate(_shooting_start(model, series, pool), series, pool=pool)
-            if best is None or sum(float(r @ r) for r in again.residuals) < sum(
-                float(r @ r) for r in best.residuals
-            ):
+            if best is None or again.sum_of_squares < best.sum_of_squares:
                 best = again
         except InputError as error:
             failure = failure or error

@@ -67,7 +67,7 @@ MOVES = 0.5
 # joint probability from which names are stated
 STATED = 0.8
 # share of all that free maps and names together explain that the names must explain, for the names to be stated
-EXPLAINED = 0.8
+EXPLAINED_BY_NAMES = 0.8
 # the same share, from which the names explain the main part
 MAINLY = 0.5
 # chance that the catalogue holds the truth, as a function of the unexplained share of the explainable mismatch: one half at
@@ -98,7 +98,8 @@ BLIND = 0.2
 SHOWS = 4.0
 
 # --- how records are scored -----------------------------------------------------------------------------------------
-# share of the effort that models of real machines leave; up to it no other scoring mode is tried (measured: 2 to 5 %, see `PRACTICAL`)
+# share of the effort that models of real machines leave; up to it no other scoring mode is tried, unless something is left without a
+# name or a band was not compared (measured: 2 to 5 %, see `PRACTICAL`)
 LEFT = 0.05
 # ratio of effort to inertial force from which effort is scored before windows: the effort moves the machine against other
 # forces. With a smaller effort the machine swings by itself, and the effort shows little of the other forces
@@ -118,9 +119,8 @@ BETTER_STEP, PATIENCE = 0.9, 2
 BETTER_TOGETHER = 0.6
 
 # --- what calibration may absorb ------------------------------------------------------------------------------------
-# [samples] how far the input delay may be negative, and the longest delay that counts as a nuisance. An input that is not held but
-# simulated as held comes out half a sample early. Every log may have a short delay; a longer one is a hypothesis of its own
-EARLIEST, LATEST = 1.5, 2.5
+# [samples] the longest delay that counts as a nuisance: every log may have a short delay; a longer one is a hypothesis of its own
+LATEST = 2.5
 # ratio to which a delay far from its start must lower the error; otherwise it is only a surrogate for missing physics
 STANDS_IN = 0.7
 # a negative delay shows an input that was not held if it exceeds this many standard deviations and this share of a sample

@@ -66,7 +66,7 @@ class Rows:
     @property
     def fitted(self) -> int:
         """Number of rows that a fit sees."""
-        return int(np.sum(self.blocks.fold[self.blocks.block] >= 0))
+        return int(self.blocks.seen_rows.sum())
 
     @property
     def held(self) -> tuple[tuple[slice, ...], ...]:
@@ -76,7 +76,7 @@ class Rows:
     @property
     def heldout(self) -> NDArray[np.bool_]:
         """Rows (n,) that no fit sees."""
-        return self.blocks.fold[self.blocks.block] < 0
+        return ~self.blocks.seen_rows
 
 
 def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseModel) -> Rows:

@@ -13,13 +13,14 @@ from threadpoolctl import threadpool_limits
 
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.admission import Admitted, admitted
-from rhythmid.diagnose.agreement import HOW, contradictions
+from rhythmid.diagnose.agreement import HOW, UNSETTLED, contradictions
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis, Untried
-from rhythmid.diagnose.baseline import causal, check_free
+from rhythmid.diagnose.baseline import check_free
 from rhythmid.diagnose.case import LEAST_CALIBRATION, SEARCHED, Budget, Case
 from rhythmid.diagnose.constants import DRIVES_IT, LEFT, QUASI_STATIC
+from rhythmid.diagnose.effort.found_delay import with_found_delay
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
 from rhythmid.diagnose.free_map import without_free_maps
@@ -28,6 +29,7 @@ from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.admissible import admissible
 from rhythmid.identify.declared import with_declared
 from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.inverse_dynamics.applicability import Applicability, applicable
@@ -288,11 +290,12 @@ def _answers(
 
     A free run that follows the machine comes first, unless the machine is quasi-static. Otherwise effort comes first where it
     is at least as large as the inertial force, because it then moves the machine against other forces. Windows come first
-    where the machine swings by itself. Effort is scored on the `whole` case, whose records are not cut. After a first answer
-    no further mode begins once the budget is spent; the next mode is then added to `untried`.
+    where the machine swings by itself, and where a band with much of the effort cannot be compared by effort. Effort is scored
+    on the `whole` case, whose records are not cut. After a first answer no further mode begins once the budget is spent; the next
+    mode is then added to `untried`.
     """
     effort_notes = (*given.whole_notes, *effort.notes)
-    driven = effort.applies and effort.effort_share >= DRIVES_IT
+    driven = effort.applies and effort.effort_share >= DRIVES_IT and not effort.band_left_out
 
     def late(way: str) -> bool:
         if case.budget.spent:
@@ -300,11 +303,11 @@ def _answers(
         return case.budget.spent
 
     quasi_static = effort.effort_share >= QUASI_STATIC
-    first = effort.applies and (quasi_static or not effort.free_run_means_something)
+    first = effort.applies and (quasi_static or not (effort.free_run_means_something or effort.band_left_out))
     if first:
         answer = _by_effort(whole, effort, effort_notes)
         yield answer
-        if answer.diagnosis.augmented.train_nrmse < LEFT or late(BY_MOTION):
+        if _tells_all(answer.diagnosis, effort) or late(BY_MOTION):
             return
     series, count = prepare((*case.records, *case.holdout)), len(case.records)
 
@@ -319,7 +322,9 @@ def _answers(
             result = free_run(case, scoring)
             diagnosis = compose(case, result, given.notes)
             model = without_record_zero(without_free_maps(result.search.fit.model))
-            yield Answer(diagnosis, causal(model), result)
+            kept = admissible(model, case.nominal, result.search.fit.std)
+            told = [note for name, note in kept.moved.items() if name in case.nominal.parameters]
+            yield Answer(replace(diagnosis, notes=(*diagnosis.notes, *told)), kept.model, result)
 
     if first or not effort.applies:
         yield from by_motion(windows=True)
@@ -334,14 +339,29 @@ def _answers(
         yield _by_effort(whole, effort, effort_notes)
         if late(BY_MOTION):
             return
-    yield from by_motion(windows=True)
-    if not driven and not late(BY_EFFORT):
+    failed = False
+    try:
+        yield from by_motion(windows=True)
+    except InputError as error:
+        if driven:
+            raise
+        failed = True
+        untried.append(Untried(BY_MOTION, str(error)))
+    if failed or not (driven or late(BY_EFFORT)):
         yield _by_effort(whole, effort, effort_notes)
+
+
+def _tells_all(found: Diagnosis, effort: Applicability) -> bool:
+    """Whether effort scoring leaves nothing that the motion could tell: little effort, and nothing without a name. The motion of a
+    quasi-static machine, a small difference of large forces, tells less than even a little effort."""
+    little = found.augmented.train_nrmse < LEFT
+    return little and (found.verdict not in UNSETTLED or effort.effort_share >= QUASI_STATIC)
 
 
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST_EFFECTS) -> Answer:
     result = effort_run(case, effort, most)
-    return Answer(compose_effort(case, result, notes), result.chosen.model, result)
+    model = with_found_delay(result.search.balance, result.chosen, case.nominal)
+    return Answer(compose_effort(case, result, notes), model, result)
 
 
 def _also_by_effort(case: Case, effort: Applicability, chosen: Answer) -> Answer:

@@ -12,7 +12,7 @@ differences into probabilities.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ from rhythmid.diagnose.constants import (
     BLOCKS_OF_A_RECORD,
     DRAWS,
     EFFECT_PRIOR,
+    EQUIVALENT,
+    FALSE_ALARM,
     FOLDS,
     REWEIGHTED,
     ROWS_OF_A_BLOCK,
@@ -31,7 +33,8 @@ from rhythmid.diagnose.constants import (
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.varying_scale import block_densities
-from rhythmid.identify.student import autocorrelation_time, scale_of, weights_of
+from rhythmid.identify.least_squares import column_norms
+from rhythmid.identify.student import autocorrelation_time, log_density, scale_of, weights_of
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -49,12 +52,14 @@ class Linearised:
     jacobian : (n, p) its derivatives with respect to the parameters.
     precision : (p,) inverse variance of each parameter's prior; 0 where it has none.
     departure : (p,) each parameter's value less its prior's mean.
+    rests : (r,) log odds of each rest of the machine, at most 0; see `odds_of_rests`. Not numbers where they are unknown.
     """
 
     residual: Array
     jacobian: Array
     precision: Array
     departure: Array
+    rests: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,11 @@ class Blocks:
         """Number of blocks."""
         return len(self.fold)
 
+    @property
+    def seen_rows(self) -> NDArray[np.bool_]:
+        """Rows (n,) that a fit sees."""
+        return self.fold[self.block] != UNSEEN
+
     def sums(self, values: Array) -> Array:
         """Sums (b,) of values (n,) over the blocks."""
         return np.asarray(np.bincount(self.block, values, self.count), dtype=np.float64)
@@ -116,14 +126,13 @@ class Blocks:
 
     def left_out(self, fold: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Rows (n,) that a fold leaves out, and rows (n,) that its fit sees: the others without gaps and unseen blocks."""
-        of_row = self.fold[self.block]
-        out = of_row == fold
+        out = self.fold[self.block] == fold
         near = out.copy()
         for shift in range(1, self.gap + 1):
             near[shift:] |= out[:-shift]
             near[:-shift] |= out[shift:]
-        seen = ~near & (of_row != UNSEEN)
-        return out, seen if seen.any() else ~out & (of_row != UNSEEN)
+        seen = ~near & self.seen_rows
+        return out, seen if seen.any() else ~out & self.seen_rows
 
 
 @dataclass(frozen=True)
@@ -131,12 +140,13 @@ class CrossValidated:
     """Prediction errors (n,), each of a fit that did not see the row, and the scale (b,) that the fit expected in each block.
 
     `penalty` is subtracted from the log density of every row that a fit sees. It is the cost of free initial states, which
-    cross-validation does not include.
+    cross-validation does not include. `rests` (r,) are log odds of rests, which no fit sees.
     """
 
     error: Array
     scale: Array
     penalty: float = 0.0
+    rests: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
@@ -148,8 +158,7 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
     """
     residual, jacobian = fit.residual, fit.jacobian
     error, scale = residual.copy(), np.ones(blocks.count)
-    norms = np.linalg.norm(jacobian, axis=0)
-    norms[norms == 0.0] = 1.0
+    norms = column_norms(jacobian)
     precision, pull = np.diag(fit.precision / norms**2), fit.precision * fit.departure / norms
     precision = precision + _unit_information(residual, jacobian, blocks) / np.outer(norms, norms)
     for fold in np.unique(blocks.fold):
@@ -167,12 +176,12 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
             spread = max(scale_of((residual + change)[seen]), blocks.least)
         error[out] += change[out]
         scale[blocks.fold == fold] = spread
-    return CrossValidated(error, scale)
+    return CrossValidated(error, scale, rests=fit.rests)
 
 
 def _unit_information(residual: Array, jacobian: Array, blocks: Blocks) -> Array:
     """Average information (p, p) on the parameters of one row that the folds see."""
-    seen = blocks.fold[blocks.block] != UNSEEN
+    seen = blocks.seen_rows
     spread = max(scale_of(residual[seen]), blocks.least)
     weight = np.where(seen, weights_of(residual, spread) / spread**2, 0.0)
     return _normal_equations(jacobian, weight, residual)[0] / max(int(seen.sum()), 1)
@@ -192,7 +201,7 @@ def _normal_equations(jacobian: Array, weight: Array, residual: Array) -> tuple[
 def prediction(
     found: CrossValidated, blocks: Blocks, time: float, measured: Array | None = None
 ) -> Prediction:
-    """The blocks' log densities and squared errors.
+    """The blocks' log densities and squared errors. Each rest is one more block, without samples.
 
     `time` is the autocorrelation time [samples], the same for all hypotheses. `measured` (n,) are the errors in the unit of
     the measurement, where the scored ones are whitened.
@@ -201,7 +210,23 @@ def prediction(
     counts = blocks.sums(np.ones(len(found.error)))
     density = block_densities(blocks.split(found.error), found.scale, time, seen, blocks.least)
     error = found.error if measured is None else measured
-    return Prediction(density - found.penalty * counts * seen / time, blocks.sums(error**2), counts, ~seen)
+    none = np.zeros(len(found.rests))
+    return Prediction(
+        np.concatenate([density - found.penalty * counts * seen / time, found.rests]),
+        np.concatenate([blocks.sums(error**2), none]),
+        np.concatenate([counts, none]),
+        np.concatenate([~seen, none.astype(bool)]),
+    )
+
+
+def odds_of_rests(excess: Sequence[Array], scale: float) -> Array:
+    """Log odds (r,) of rests against one that the model balances, by efforts (n,) that it does not balance; at most 0.
+
+    `scale` is that of the model's errors. A rest counts as one sample, because effort and position hardly change in it. Its odds are limited
+    to `BLOCK_ODDS`: a brake or a hand that no model contains may hold the machine. A rest that the model balances says nothing for it.
+    """
+    lost = [float(np.mean(log_density(one, scale) - log_density(np.zeros(1), scale))) for one in excess]
+    return np.maximum(np.array(lost), -math.log(BLOCK_ODDS))
 
 
 def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[Prediction]:
@@ -213,7 +238,32 @@ def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[P
     if not found:
         return []
     time = time_of_best(found, record)
-    return [prediction(one, blocks, time) for one in found]
+    return with_trusted_rests([prediction(one, blocks, time) for one in found], blocks)
+
+
+def with_trusted_rests(predictions: Sequence[Prediction], blocks: Blocks) -> list[Prediction]:
+    """Predictions in which rests count where they can be trusted, and otherwise say nothing.
+
+    All rests of a machine may have one cause that no model contains, such as a brake. They are trusted as long as a hypothesis that balances
+    them predicts the motion as well as any: the motion decides, and rests decide where it does not. For a free map, whose rests are
+    not numbers, they say nothing.
+    """
+    motion = np.array([one.log_density[: blocks.count] for one in predictions])
+    rests = np.array([one.log_density[blocks.count :].sum() for one in predictions])
+    known = np.flatnonzero(~np.isnan(rests))
+    trusted = False
+    if len(known) and rests[known].min() < 0.0:
+        score = motion[known].sum(axis=1)
+        balances = rests[known] >= rests[known].max() - EFFECT_PRIOR
+        best, other = known[np.argmax(score)], known[np.argmax(np.where(balances, score, -math.inf))]
+        gain, error = _summed(motion[best] - motion[other])
+        trusted = gain <= max(EQUIVALENT * error, -math.log(FALSE_ALARM))
+    return [
+        replace(
+            one, log_density=np.concatenate([own, np.nan_to_num(one.log_density[blocks.count :]) * trusted])
+        )
+        for one, own in zip(predictions, motion, strict=True)
+    ]
 
 
 def time_of_best(found: Sequence[CrossValidated], record: Whole) -> float:

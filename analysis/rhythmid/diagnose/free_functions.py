@@ -130,9 +130,7 @@ def _simulated(
 
 def values_of(known: Trajectories, name: str) -> list[Array]:
     """Values (n,) of a spline's quantity, one array for each series; `name` is that of the simulator's map, as in `SPLINED`."""
-    if name == "signal":
-        return list(known.outputs)
-    return [getattr(path, name) for path in (known.paths if name == "effort" else known.legs)]
+    return [getattr(path, name) for path in known.legs]
 
 
 def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:

@@ -1,5 +1,6 @@
 """Diagnosis in free run or in windows: the search, the contenders and their evidence, and the fit behind the answer."""
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -28,7 +29,8 @@ from rhythmid.diagnose.free_functions import motion_maps
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.diagnose.intervals import profiled
 from rhythmid.diagnose.location import Dependence, dependences
-from rhythmid.diagnose.model_uncertainty import covariance_between
+from rhythmid.diagnose.model_uncertainty import covariance_between, std_among
+from rhythmid.diagnose.probability import weights_of
 from rhythmid.diagnose.refitted_map import refitted_map
 from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import Search, search
@@ -37,7 +39,6 @@ from rhythmid.diagnose.search.round import distinct
 from rhythmid.diagnose.search.score_tests import (
     Trajectories,
     changes_of,
-    projected,
     trajectories,
     under,
     whitened,
@@ -117,10 +118,10 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     trial = _trial_of(chosen, contenders)
     if trial.added != found.best.added:
         run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
+    nominal = next(one.trial for one in contenders if one.kind == "nominal")
     if case.budget.spent:
         found = _untried(found, OTHER_KINDS)
     elif chosen.kind != "freed_value":
-        nominal = next(one.trial for one in contenders if one.kind == "nominal")
         weighed = [one.trial for one in contenders]
         case.tell("trying other kinds of explanation")
         with deadline(case.budget.at(WEIGHED)):
@@ -132,16 +133,18 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
             found = _weighed(found, [one for one, _ in others], more)
         contenders += more
     case.tell("locating what is left")
+    began = time.monotonic()
     after = dependences(run, rows, case.pool)
+    took = time.monotonic() - began
     refitted = None
     before = after
-    if trial.added and case.budget.passed(WEIGHED):
+    if trial.added and not case.budget.allows(took, WEIGHED):
         before, found = [], _untried(found, BEFORE)
     elif trial.added:
+        case.tell("finding what the mismatch of the nominal model depends on")
         nominal_run = trajectories(found.nominal)
         before = dependences(nominal_run, rows, case.pool)
         if not case.budget.spent:
-            nominal = next(one.trial for one in contenders if one.kind == "nominal")
             refitted = refitted_map(nominal, before, nominal_run, seen, rows, step)
     maps = _maps(after, refitted, contenders, rows)
     contest = _contest(contenders, maps, rows, found, run, sizes, structured)
@@ -159,19 +162,25 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     found = _with_best(found, trial, case)
     least = _detectable(contenders, selection.chosen, rows)
     if trial.added and selection.chosen.kind == "effects":
-        found = _told(_followed(found, case), INTERVALS)
+        late = case.budget.passed(EXPLAINED)
+        found = _untried(found, INTERVALS) if late else _told(_followed(found, case), INTERVALS)
     found = replace(found, excluded=(*found.excluded, *_unconverged(calibration.fit, found)))
     between = covariance_between(found.fit.names, selection.chosen, contest.hypotheses)
     unnamed = np.zeros((len(found.fit.names),) * 2)
     if case.budget.passed(EXPLAINED):
         found = _untried(found, SMALL_EFFECTS)
     else:
+        case.tell("adding to the standard deviations what small effects may change")
         unnamed = _unnamed(found, known, case)
     shown = unseen
     if unseen and case.budget.passed(EXPLAINED):
         shown, found = (), _untried(found, RERUN)
     fit = with_robust_covariance(found.fit)
-    errors = size_errors(fit.model, selection.chosen.elements, fit.std)
+    weights = weights_of(contest, selection)
+    among = std_among(fit.std, selection.chosen, contest.hypotheses, weights)
+    errors = size_errors(fit.model, selection.chosen.elements, among)
+    if shown:
+        case.tell("running both models over the held-out records")
     found = replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed))
     nominal_there, chosen_there = (
         rerun(one.model, shown, found.noise, one.run.max_step) for one in (found.nominal, found.fit)
@@ -254,7 +263,7 @@ def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.floa
     columns = np.empty((len(line.residual), len(tried) + len(maps)), order="F")
     count = 0
     for outputs in chain((one.outputs for one in changes_of(run, tried, case.pool)), maps):
-        columns[:, count] = projected(fit, whitened(fit, outputs, fit.noise))
+        columns[:, count] = line.without_starts(whitened(fit, outputs, fit.noise))
         count += 1
     columns = columns[:, :count]
     priors = [fit.model.parameters[name].prior for name, one in zip(fit.names, known) if one]
@@ -275,12 +284,12 @@ def _with_jitter(scoring: Scoring) -> Calibration:
 
 
 def _trial_of(hypothesis: Hypothesis, contenders: Sequence[Contender]) -> Trial:
-    return next(one.trial for one in contenders if tuple(sorted(one.trial.added)) == hypothesis.key)
+    return next(one.trial for one in contenders if one.trial.key == hypothesis.key)
 
 
 def _with_best(found: Search, trial: Trial, case: Case) -> Search:
     """The search with another chosen model."""
-    if tuple(sorted(trial.added)) == tuple(sorted(found.best.added)):
+    if trial.key == found.best.key:
         return found
     fit = whole_fit(trial, found.fit.run.series, found.noise, found.fit.run.max_step, pool=case.pool)
     nominal = under(found.nominal, found.noise, case.pool)
@@ -342,5 +351,5 @@ def _maps(
 
 def _detectable(contenders: Sequence[Contender], chosen: Hypothesis, rows: Rows) -> float:
     """The smallest detectable rms in these records, relative to the size that errors are a share of."""
-    error = next(one.error for one in contenders if tuple(sorted(one.trial.added)) == chosen.key)
+    error = next(one.error for one in contenders if one.trial.key == chosen.key)
     return detectable(error, autocorrelation_time(error, rows.record)) / max(rows.size, 1e-300)

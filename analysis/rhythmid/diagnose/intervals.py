@@ -23,6 +23,7 @@ from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.search.refit import whole_fit
 from rhythmid.errors import InputError
 from rhythmid.identify.descent import descend
+from rhythmid.identify.least_squares import column_norms
 from rhythmid.identify.output_error import Fit
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.model import Model
@@ -38,7 +39,7 @@ WIDEST = 2.0**20  # largest distance at which the rise is sought [standard devia
 BEYOND = 30.0  # the same as a multiple of the parameter's value
 DESCENTS = 3  # largest number of descents to lower minima
 TIED = 0.5  # share of its variance that a machine parameter must have in common with an effect's parameter to be checked, too
-AGAIN = 6  # iterations of the other parameters at a moved one
+ITERATIONS = 6  # iterations of the other parameters at a moved one
 
 
 @dataclass(frozen=True)
@@ -179,12 +180,11 @@ def _rises(fit: Fit, ways: Sequence[_Way], pool: ThreadPoolExecutor | None) -> l
 
 def _rise(problem: Problem, fit: Fit, place: int, residuals: Sequence[Array]) -> float:
     columns = np.delete(fit.linearisation.jacobian, place, axis=1)
-    norms = np.linalg.norm(columns, axis=0)
-    others, _ = np.linalg.qr(columns / np.where(norms > 0.0, norms, 1.0))
+    others, _ = np.linalg.qr(columns / column_norms(columns))
 
     def left(given: Sequence[Array]) -> float:
         white = [problem.whitened(index, residual) for index, residual in enumerate(given)]
-        rest = np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
+        rest = fit.linearisation.without_starts(white)
         return float(np.sum((rest - others @ (others.T @ rest)) ** 2))
 
     with np.errstate(over="ignore", invalid="ignore"):
@@ -208,7 +208,7 @@ def _again(fit: Fit, way: _Way, pool: ThreadPoolExecutor | None) -> tuple[float,
     steps, state_steps = fit.differences
     try:
         end = descend(
-            model, fit.run, others, fit.noise, fit.starts, AGAIN, pool,
+            model, fit.run, others, fit.noise, fit.starts, ITERATIONS, pool,
             differences=(np.delete(steps, way.place), state_steps),
         )  # fmt: skip
     except InputError:

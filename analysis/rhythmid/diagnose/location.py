@@ -19,6 +19,7 @@ from rhythmid.diagnose.free_functions import FreeMap, free_maps
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
 from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.least_squares import column_norms
 from rhythmid.identify.output_error import Fit, rerun
 
 Array = NDArray[np.float64]
@@ -61,8 +62,7 @@ class Reach:
 
     def refitted(self, seen: Array, hidden: Array) -> Array:
         """Changes of the hidden rows (h, k) after fitting the initial state to the changes of the seen rows (n, k)."""
-        norms = np.linalg.norm(self.seen, axis=0)
-        norms[norms == 0.0] = 1.0
+        norms = column_norms(self.seen)
         taken = np.linalg.lstsq(self.seen / norms, seen, rcond=1e-7)[0]
         return hidden - self.starts / norms @ taken
 
@@ -170,8 +170,7 @@ def dependences(known: Trajectories, rows: Rows, pool: ThreadPoolExecutor | None
 def _coefficients(fit: Linearised, fitted: int) -> Array:
     """Least-squares change of all parameters on the rows that the fit sees."""
     jacobian, residual = fit.jacobian[:fitted], fit.residual[:fitted]
-    norms = np.linalg.norm(jacobian, axis=0)
-    norms[norms == 0.0] = 1.0
+    norms = column_norms(jacobian)
     normal = jacobian.T @ jacobian / np.outer(norms, norms) + np.diag(fit.precision / norms**2)
     pull = fit.precision * fit.departure / norms
     return -np.linalg.lstsq(normal, jacobian.T @ residual / norms + pull, rcond=1e-12)[0] / norms

@@ -95,7 +95,7 @@ def removed_by(some: Sequence[str], chosen: Hypothesis, contest: Contest) -> flo
 
     Laws that are unlikely to be true remove a part that belongs to an unknown law.
     """
-    whole = contest.nominal.prediction.mean_square - contest.floor
+    whole = contest.mismatch
     others = set(chosen.elements) - set(some)
     without = [one.prediction.mean_square for one in contest.hypotheses if set(one.elements) == others]
     if whole <= 0.0 or not without:

@@ -216,7 +216,8 @@ RULES: tuple[Rule, ...] = (
     ),
     _shape_rule(
         AT_END,
-        "distance of the effect's parameters from the bounds within which its name applies, as a share of the bound",
+        "distance of the effect's parameters from the bounds within which its name applies, as a share of the bound; and of its size from that "
+        "of no effect, as a share of its first guess",
         "only a limit of its parameters is identifiable, where it is another effect",
     ),
     _shape_rule(

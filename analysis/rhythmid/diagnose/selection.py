@@ -71,6 +71,11 @@ class Contest:
         every = [one.prediction for one in self.hypotheses]
         return min(one.mean_square for one in (*every, *self.maps.values()))
 
+    @property
+    def mismatch(self) -> float:
+        """Explainable mismatch: mean squared error that the best prediction of all removes from that of the nominal model."""
+        return self.nominal.prediction.mean_square - self.floor
+
     def of_size(self, count: int) -> list[Hypothesis]:
         """Hypotheses with this number of effects, the best prediction first."""
         found = [one for one in (*self.hypotheses, *self.ruled_out) if len(one.elements) == count]
@@ -229,7 +234,6 @@ def equivalent(other: Hypothesis, best: Hypothesis, contest: Contest) -> bool:
     if special_case(other, best):
         return not replaces(contest.claim(best, other, other))
     less, uncertain = removed(best.prediction, other.prediction)
-    whole = contest.nominal.prediction.mean_square - contest.floor
-    if less - EQUIVALENT * uncertain > RICHER * whole:
+    if less - EQUIVALENT * uncertain > RICHER * contest.mismatch:
         return False
     return weight_for(best.prediction, other.prediction) <= decisive(1)

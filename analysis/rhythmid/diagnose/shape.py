@@ -17,6 +17,7 @@ from rhythmid.diagnose.constants import FAR_RANGES, REACH
 from rhythmid.diagnose.search.score_tests import Trajectories
 from rhythmid.diagnose.static_law import INSTANTS, SAME, curved
 from rhythmid.elements.element import Element, Scales
+from rhythmid.elements.first_guess import NoGuess
 from rhythmid.model import Model, Term
 from rhythmid.simulation.effect import Path, effect_along
 
@@ -61,8 +62,12 @@ def _acts_within(known: Trajectories, model: Model, term: Term) -> float:
 
 
 def within_bounds(term: Term, sizes: Scales) -> float:
-    """Smallest distance of a free parameter from a bound set by the element's `ranges`, as a share of that bound."""
-    least = math.inf
+    """Smallest distance of a free parameter from a bound set by the element's `ranges`, as a share of that bound.
+
+    Also the distance of its size from that of no effect, as a share of the smallest first guess: an effect without a size is the
+    hypothesis without it.
+    """
+    least = _size(term, sizes)
     for name in term.element.ranges(sizes) if term.element.ranges is not None else ():
         if term.values[name].fixed:
             continue
@@ -70,6 +75,20 @@ def within_bounds(term: Term, sizes: Scales) -> float:
         ends = [end for end in term.values[name].bounds if math.isfinite(end) and end != 0.0]
         least = min([least, *(abs(value - end) / abs(end) for end in ends)])
     return least
+
+
+def _size(term: Term, sizes: Scales) -> float:
+    """Size of an effect, as a share of the smallest first guess; infinite for one whose size has no first guess or is no free parameter."""
+    element = term.element
+    name, absent = element.size, element.absent
+    if not name or not math.isfinite(absent) or term.values[name].fixed:
+        return math.inf
+    try:
+        guesses = [abs(start[name] - absent) for start in element.first_guesses(sizes) if name in start]
+    except NoGuess:
+        return math.inf
+    usual = min((one for one in guesses if one > 0.0), default=0.0)
+    return abs(term.values[name].value - absent) / usual if usual > 0.0 else math.inf
 
 
 def _own_frequency(term: Term, sizes: Scales) -> float:

@@ -17,7 +17,8 @@ def size_errors(model: Model, labels: Sequence[str], std: Mapping[str, float]) -
         Labels of its effects. Labels of other things, and effects whose size is not estimated or may be arbitrarily large, are
         left out.
     std
-        Standard deviations of the model's estimated parameters, by name, without contributions from other models.
+        Standard deviations of the model's estimated parameters, by name, with the differences among the hypotheses that share the
+        evidence (`std_among`).
     """
     found = {}
     for label in labels:

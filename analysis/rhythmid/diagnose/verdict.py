@@ -84,7 +84,7 @@ class Decision:
 
 def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
     """The remainder beside a hypothesis: what free maps predict, or hypotheses with more effects that were not accepted."""
-    whole = contest.nominal.prediction.mean_square - contest.floor
+    whole = contest.mismatch
     rivals = [(quantity, (), one, len(contest.maps)) for quantity, one in contest.maps.items()]
     rivals += [
         ("", _further(one, chosen), one.prediction, contest.candidates)
@@ -136,7 +136,7 @@ def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:
     much when added first.
     """
     nominal, after = contest.nominal.prediction.mean_square, chosen.prediction.mean_square
-    whole = nominal - contest.floor
+    whole = contest.mismatch
     squares = {one.key: one.prediction.mean_square for one in contest.hypotheses}
     found = {}
     for label in chosen.elements:
@@ -175,7 +175,7 @@ def lost_share(contest: Contest, chosen: Hypothesis) -> float:
     An error that follows from its own past is not noise. It counts as unexplained, like the part that a free map predicts, although
     nothing that was tried predicts it.
     """
-    whole = contest.nominal.prediction.mean_square - contest.floor
+    whole = contest.mismatch
     structured = contest.structured_after**2 * chosen.prediction.mean_square
     beyond = structured - (LEFT * contest.size) ** 2
     return float(min(max(beyond, 0.0) / whole, 1.0)) if whole > 0.0 else 0.0

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from rhythmid.diagnose.constants import (
     BLIND,
-    EXPLAINED,
+    EXPLAINED_BY_NAMES,
     LEFT,
     MAINLY,
     MISSES_MOST,
@@ -239,7 +239,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
     VerdictRule(
         "partly_left",
         "share of the mismatch that the effects leave and something else predicts, where the budget did not end the search",
-        1.0 - EXPLAINED,
+        1.0 - EXPLAINED_BY_NAMES,
         "unknown_physics",
         "this effect is mainly what is missing, but {left:.0f} % of the mismatch is left and depends on {goes_with}",
         _of_search(lambda found: found.left, False),

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rhythmid.deadline import SPENT, time_is_up
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import FreeRun, start_of
+from rhythmid.identify.least_squares import column_norms
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.sensitivity import Linearisation, Problem, state_update
 from rhythmid.identify.series import dominant_frequency
@@ -94,8 +95,7 @@ def _step(
     step = np.zeros(jacobian.shape[1])
     while free.any():
         j = jacobian[:, free]
-        norms = np.linalg.norm(j, axis=0)
-        norms[norms == 0.0] = 1.0
+        norms = column_norms(j)
         scaled = j / norms
         hessian = scaled.T @ scaled
         left = residual + jacobian[:, ~free] @ step[~free]

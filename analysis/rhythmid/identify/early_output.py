@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 PARTS = 6  # of a record, each with its own lag
 LEAST_SAMPLES = 64  # least samples in a part; fewer give no lag
 FARTHEST = 0.25  # largest lag on either side, as a share of a part
-# least lead, in samples of the slower channel: an input that is taken for held but is not gives a lead of 1.5 samples
+# samples by which an output may seem to come before its command, and an estimated delay be negative: an input that is taken for held
+# but is not gives up to 1.5 samples
 EARLIEST = 1.5
 SURE = 4.0  # standard errors by which the lead must exceed that, as for a delay that comes out negative
 # largest ratio of the residual at the best lead to that at the best lag: with a single sine either channel seems to

@@ -11,7 +11,7 @@ from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import fit_effort, variation_of
 from rhythmid.model import Model
 from rhythmid.record.record import Record
-from rhythmid.report.quantity import rounded, with_written_unit
+from rhythmid.report.quantity import with_std, with_written_unit
 
 
 def effort_note(records: Sequence[Record], model: Model, nrmse: float) -> str | None:
@@ -35,7 +35,7 @@ def effort_note(records: Sequence[Record], model: Model, nrmse: float) -> str | 
         return None
     known = model.parameters
     values = [
-        f"{name} {with_written_unit(f'{rounded(fit.model.value(name), std)} ± {std:.2g}', known[name].unit)}"
+        f"{name} {with_written_unit(with_std(fit.model.value(name), std), known[name].unit)}"
         for name, std in zip(fit.names, fit.std[1:].tolist(), strict=True)
     ]
     return (

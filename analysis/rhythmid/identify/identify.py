@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.admissible import admissible
 from rhythmid.identify.caution import Caution, none_told, not_identified, other_unit
 from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.declared import own_model, with_declared
@@ -194,11 +195,13 @@ def identify(
     balanced = None if found.usable else effort_note(fitted, machine, found.quality["nrmse"])
     said = (*said, *(() if balanced is None else (balanced,)))
     notes = (*still, *(note for one in clean for note in one.notes), *drives, *cut, *said, *found.notes)
+    kept = admissible(found.model, machine, None if found.joint is None else found.joint.fit.std)
+    notes += kept.notes
     if not unseen:
-        return replace(found, notes=notes)
+        return replace(found, model=kept.model, notes=notes)
     tell("running the identified model over the held-out records")
-    held_out = held_out_runs(found.model, found.joint, fitted, unseen)
-    return replace(found, notes=(*notes, *held_out.notes), held_out=held_out)
+    seen = held_out_runs(found.model, found.joint, fitted, unseen)
+    return replace(found, model=kept.model, notes=(*notes, *seen.notes), held_out=seen)
 
 
 def _identified(
@@ -226,7 +229,7 @@ def _identified(
     seen = _Seen(given, nominal, tuple(pumpings), tuple(results))
     found = _by_likelihood(seen, forcing, offset, htf, tell) if method == "joint" else None
     return found or _by_paper(
-        seen, htf if method == "joint" or htf != "auto" else "regularised_least_squares", method
+        seen, htf if method == "joint" or htf != "auto" else "regularised_least_squares"
     )
 
 
@@ -257,12 +260,8 @@ class _Seen:
         if isinstance(result, str):
             return Shown(None, False, missing or result, lacks or result)
         functions = None if missing else _harmonics(result, htf)
-        if (
-            functions is not None
-            and functions.method == "regularised_least_squares"
-            and htf == "auto"
-            and lacks
-        ):
+        by_paper = functions is not None and functions.method == "regularised_least_squares"
+        if by_paper and htf == "auto" and lacks:
             functions, missing = None, lacks  # equation (5) of the paper has the same conditions
         return Shown(functions, lacks is None, missing, lacks)
 
@@ -289,7 +288,7 @@ class _Seen:
         return (not_identified(nrmse, response), *told, *cautions)
 
 
-def _by_paper(seen: _Seen, htf: HtfMethod, method: Method) -> Identification:
+def _by_paper(seen: _Seen, htf: HtfMethod) -> Identification:
     """Parameters and delays by the paper's method: average over records, weighted by inverse variance."""
     records, results = seen.records, seen.paper
     first = results[0]
@@ -320,7 +319,7 @@ def _by_likelihood(
     """Parameters and delays by joint maximum likelihood; HTFs without a model; None where only these can be given, because a cycle of
     unknown forcing cannot be simulated."""
     records, paper = seen.records, seen.paper
-    unforced = paper and not any(pumping.active for pumping in seen.pumpings)
+    unforced = paper and not any(one.active for one in seen.pumpings)
     tell("fitting the model to all records at once")
     try:
         found = best_fit(records, seen.nominal)
@@ -345,19 +344,19 @@ def _by_likelihood(
     series = fit.run.series
     told = are_told(fit.model, series, {name: (values[name].value, fit.std[name]) for name in own})
     parameters = {
-        name: Estimate(values[name].value, fit.std[name], values[name].unit)
-        if name in told
-        else Estimate(None, None, values[name].unit)
+        name: Estimate(
+            *((values[name].value, fit.std[name]) if name in told else (None, None)), values[name].unit
+        )
         for name in own
     }
     jitter = measurement_jitter(fit)
+    late_by = (None, None) if late is None else (late.std, late.uncertainty)
     quality = quality_of(fit.nrmse(), records, paper) | {
         "unexplained_response": joint.search.response,
-        "noise_std": math.sqrt(fit.noise.variance * fit.run.series[0].block),
+        "averaged": series[0].block,
+        "noise_std": math.sqrt(fit.noise.variance * series[0].block),
         "measurement_jitter": jitter.to_dict(),
-        "command_jitter": Estimate(None, None, "s").to_dict()
-        if late is None
-        else Estimate(late.std, late.uncertainty, "s").to_dict(),
+        "command_jitter": Estimate(*late_by, "s").to_dict(),
     }
     delays = delays_of(joint, forcing, offset, SOURCES.get(seen.source, "the forcing"))
     delays = of_told_sum(delays, fit.model, series)
@@ -393,7 +392,7 @@ def _open(delays: Delays, period: float) -> bool:
 
 
 def _harmonics(result: PaperResult, method: HtfMethod) -> HarmonicEstimates:
-    """Transfer functions of a record, from the spectra that the paper's method has already computed."""
+    """Transfer functions of a record, from the spectra of the paper's method."""
     if method == "regularised_least_squares":
         return smoothed(result.estimate)
     return harmonic_transfer_functions(result.spectra, result.fit.linearised.cycle.ring_down, method)

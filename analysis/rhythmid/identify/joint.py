@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model, with_declared
+from rhythmid.identify.early_output import EARLIEST
 from rhythmid.identify.harmonic_likelihood import (
     DELAYS,
     INPUT_DELAY,
@@ -43,7 +44,6 @@ STEP, FINE_STEP = (
 # required ratio of errors for a delay one period of the motion longer: a periodic motion looks the same a period
 # later, except at its start
 LATER_PERIOD = 0.7
-EARLIEST = 1.5  # samples by which an estimated delay may be negative
 NO_PUMPING = Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none")
 
 
@@ -220,7 +220,7 @@ def _search_in_time(model: Model, series: Sequence[Series]) -> Fit:
         except InputError as error:
             failure = error
             continue
-        if best is None or _sum_of_squares(trial) < _sum_of_squares(best):
+        if best is None or trial.sum_of_squares < best.sum_of_squares:
             best = trial
         if best.nrmse() < 0.1:
             return best
@@ -240,10 +240,6 @@ def _search_in_time(model: Model, series: Sequence[Series]) -> Fit:
             if trial.chi2 < best.chi2:
                 best = trial
     return best if best is reached else estimate(best.model, series)
-
-
-def _sum_of_squares(fit: Fit) -> float:
-    return sum(float(r @ r) for r in fit.residuals)
 
 
 def joint_likelihood(records: Record | Sequence[Record], model: Model) -> JointFit:

@@ -25,6 +25,13 @@ def reduced(parts: Iterable[tuple[Array, Array]], most: int = KEPT_ROWS) -> tupl
     return np.ascontiguousarray(joined[:, :-1]), joined[:, -1].copy()
 
 
+def column_norms(columns: Array) -> Array:
+    """Norms (p,) of columns (n, p), to scale them by; 1 for a zero column, which stays zero."""
+    norms = np.asarray(np.linalg.norm(columns, axis=0), dtype=np.float64)
+    norms[norms == 0.0] = 1.0
+    return norms
+
+
 def orthonormal(columns: Array) -> Array:
     """Orthonormal basis (n, r) of the span of these columns (n, p); linearly dependent and zero columns add nothing."""
     norms = np.linalg.norm(columns, axis=0)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter, lfiltic
 
 Array = NDArray[np.float64]
+HIGHEST_ORDER = 24  # of an autoregressive model
 TINY = 1e-12  # least share of the variance that a predictor leaves
 PREDICTED = 25.0  # ratio of a residual's power to that of its innovations above which it is not noise
 
@@ -103,13 +104,13 @@ def runs(used: NDArray[np.bool_]) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2])]
 
 
-def estimate_noise(residuals: Sequence[Array], highest: int = 24, floor: float = 1e-300) -> NoiseModel:
+def estimate_noise(residuals: Sequence[Array], floor: float = 1e-300) -> NoiseModel:
     """Autoregressive model of residual stretches (n_i,); the Bayesian information criterion selects the order."""
     stretches = [r for r in residuals if len(r) > 8]
     total = sum(len(r) for r in stretches)
     if total == 0:
         return NoiseModel(np.empty(0), max(floor, 1e-300))
-    highest = int(min(highest, total // 20, min(len(r) for r in stretches) // 2))
+    highest = int(min(HIGHEST_ORDER, total // 20, min(len(r) for r in stretches) // 2))
     covariance = np.zeros(highest + 1)
     for r in stretches:
         for lag in range(highest + 1):
@@ -131,21 +132,21 @@ def estimate_noise(residuals: Sequence[Array], highest: int = 24, floor: float =
     return best
 
 
-def burg(stretches: Sequence[Array], highest: int = 24) -> NoiseModel:
+def burg(stretches: Sequence[Array]) -> NoiseModel:
     """Autoregressive model of stretches (n_i,) by Burg's method; the Bayesian information criterion selects the order.
 
     For noise that excites a lightly damped machine. Sample covariances treat a stretch as zero beyond its ends,
     which hides such a narrow spectrum. (J. P. Burg, Maximum Entropy Spectral Analysis, thesis, Stanford 1975;
     Stoica, Moses, section 3.9.3.)
     """
-    forward = backward = [one for one in stretches if len(one) > 2 * highest]
+    forward = backward = [one for one in stretches if len(one) > 2 * HIGHEST_ORDER]
     total = sum(len(one) for one in forward)
     error = sum(float(one @ one) for one in forward) / max(total, 1)
     if error <= 0.0:
         return NoiseModel(np.empty(0), 1e-300)
     best, least = NoiseModel(np.empty(0), float(np.sqrt(error))), np.log(error)
     a = np.empty(0)
-    for order in range(1, highest + 1):
+    for order in range(1, HIGHEST_ORDER + 1):
         ahead, behind = [f[1:] for f in forward], [b[:-1] for b in backward]
         power = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind))
         reflection = 2.0 * sum(float(f @ b) for f, b in zip(ahead, behind)) / max(power, 1e-300)

@@ -70,6 +70,11 @@ class Fit:
         """Finite-difference steps of parameters (p,) and initial states (q,) for the sensitivities."""
         return np.abs(self.linearisation.steps), self.linearisation.state_steps
 
+    @property
+    def sum_of_squares(self) -> float:
+        """Sum of the squared residuals, not whitened."""
+        return sum(float(r @ r) for r in self.residuals)
+
     def nrmse(self, hidden: bool = False) -> float:
         """rms(simulated − measured) / std(measured) over the averages used, or over the hidden ones."""
         return normalised_error(self.residuals, self.run.series, hidden)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.identify.joint import JointFit, explained
+from rhythmid.identify.least_squares import column_norms
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate, minimise
 from rhythmid.identify.record_zero import others_marked, with_record_zero
@@ -43,9 +44,9 @@ def zero_scores(fit: Fit) -> Array:
         constant = constant - basis @ (basis.T @ constant)
         parts.append(np.outer(constant, [float(record_of(one) == name) for name in names]))
     columns = np.hstack([here.jacobian, np.concatenate(parts)])
-    norms = np.linalg.norm(columns, axis=0)
-    norms[norms == 0.0] = 1.0
-    inverse = np.linalg.pinv((columns / norms).T @ (columns / norms), rcond=1e-12)
+    norms = column_norms(columns)
+    normal = (columns / norms).T @ (columns / norms)
+    inverse = np.asarray(np.linalg.pinv(normal, rcond=1e-12), dtype=np.float64)
     step = -inverse @ ((columns / norms).T @ here.residual)
     std = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
     remainder = here.residual + (columns / norms) @ step
@@ -69,7 +70,7 @@ def with_own_zeros(joint: JointFit) -> tuple[JointFit, tuple[str, ...]]:
         again = estimate(fit.model.with_values(values), series, max_step=fit.run.max_step)
     except InputError:
         return kept
-    before, other, after = (sum(float(r @ r) for r in one.residuals) for one in (fit, again, free))
+    before, other, after = (one.sum_of_squares for one in (fit, again, free))
     before = min(before, other)
     if after > LEFT * before:
         return kept

@@ -6,7 +6,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from rhythmid.report.quantity import rounded
+from rhythmid.report.quantity import averaged_words, rounded
 from rhythmid.report.terminal_table import print_estimates
 
 
@@ -39,7 +39,10 @@ def show(result: Mapping[str, Any], console: Console) -> None:
         console.print(f"not determined: {words}")
     _show_transfer_functions(result, console)
     quality = result["quality"]
-    console.print(f"{quality['rate']:.6g} Hz, {quality['gaps']} gaps, free-run NRMSE {quality['nrmse']:.5f}")
+    of = averaged_words(quality.get("averaged", 1))
+    console.print(
+        f"{quality['rate']:.6g} Hz, {quality['gaps']} gaps, free-run NRMSE {quality['nrmse']:.5f}{of}"
+    )
     _show_held_out(result.get("held_out"), console)
     for note in result["notes"]:
         console.print(f"note: {note}", markup=False)

@@ -3,6 +3,8 @@
 No missing effect affects this noise estimate. It needs stretches in which command and forcing repeat.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,7 @@ from rhythmid.identify.series import Series
 from rhythmid.simulation.signal import FOR_EVER
 
 Array = NDArray[np.float64]
+TRANSIENT = 0.4  # first part of each series, as a share, that may not have settled
 ENOUGH_DIFFERENCES = 400  # least number of differences for a reported noise level
 
 
@@ -49,8 +52,8 @@ def repeat_length(series: Series) -> int | None:
     return None
 
 
-def noise_from_repeats(series: list[Series], settle: float = 0.4) -> NoiseModel | None:
-    """Noise model from differences between periods; the first `settle` share of each series is left out as transient.
+def noise_from_repeats(series: Sequence[Series]) -> NoiseModel | None:
+    """Noise model from differences between periods; the first part of each series is left out as transient.
 
     None where too few periods repeat.
     """
@@ -59,7 +62,7 @@ def noise_from_repeats(series: list[Series], settle: float = 0.4) -> NoiseModel 
         lag = repeat_length(one)
         if lag is None:
             continue
-        begin = int(max(settle * one.blocks, lag))
+        begin = int(max(TRANSIENT * one.blocks, lag))
         value = one.averaged
         if one.blocks - lag - begin < 64:
             continue

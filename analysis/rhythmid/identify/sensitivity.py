@@ -45,6 +45,10 @@ class Linearisation:
     steps: Array
     state_steps: Array
 
+    def without_starts(self, white: Sequence[Array]) -> Array:
+        """Whitened signals of the series (n_s,), joined (n,), with the effects of the initial states projected out."""
+        return np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, self.bases)])
+
 
 class Problem:
     """One structure, its series and a noise model: residuals and their sensitivities."""

@@ -28,6 +28,7 @@ from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, is_hel
 # share of blocks with a gap above which timestamps are too uneven for averaging; rare gaps cost fewer
 TORN = 0.1
 OFTEN = 0.5  # in blocks: interval of a held command below which the machine averages its steps
+HELD_OUT = 0.2  # last part of each series, as a share, that is held out where no separate records are given
 REACH = 2  # blocks on either side used in the differences of `of_block`
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -351,11 +352,11 @@ def displacement(series: Series) -> Array:
     return series.origin + cumulative_trapezoid(series.value, series.time, initial=0.0)
 
 
-def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Series], list[Series]]:
+def hold_out_tail(series: Sequence[Series]) -> tuple[list[Series], list[Series]]:
     """Each series with its last part held out, and the same series with only that part to be scored."""
     seen, unseen = [], []
     for one in series:
-        last = np.arange(one.blocks) >= round((1.0 - share) * one.blocks)
+        last = np.arange(one.blocks) >= round((1.0 - HELD_OUT) * one.blocks)
         seen.append(replace(one, used=one.used & ~last, hidden=one.used & last))
         unseen.append(replace(one, used=one.used & last))
     return seen, unseen

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from rhythmid.identify.least_squares import column_norms
 from rhythmid.identify.output_error import Fit
 from rhythmid.identify.record_zero import zero_place
 from rhythmid.identify.sensitivity import Problem, span
@@ -33,8 +34,7 @@ def zeros_of(fit: Fit) -> dict[str, tuple[float, float]]:
             columns[:, p + own.index(index)] = sensitivity[:, place] / state_steps[place]
         parts.append(columns - basis @ (basis.T @ columns))
     joint = np.concatenate(parts)
-    norms = np.linalg.norm(joint, axis=0)
-    norms[norms == 0.0] = 1.0
+    norms = column_norms(joint)
     scaled = joint / norms
     variances = np.diag(np.linalg.pinv(scaled.T @ scaled, rcond=1e-12)) / norms**2
     found: dict[str, tuple[float, float]] = {}

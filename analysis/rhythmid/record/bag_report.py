@@ -13,7 +13,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.angle_wrap import wrap_notes
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block
-from rhythmid.record.cleaning import LeftOut, cleaned, peak_note
+from rhythmid.record.cleaning import LeftOut, cleaned, peak_note, placeholder_notes
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.gaps import Cut, cut_at_gaps
 from rhythmid.record.joint_notes import notes_of_joints
@@ -81,7 +81,8 @@ class BagReport:
     notes : messages about the recording, one line each.
     damage : the notes about damage of the files; empty for a complete recording.
     record : what could be read; None if it cannot be used as mapped.
-    left_out : samples that no analysis will use, one entry for each reason; the notes state them as well.
+    left_out : samples that no analysis will use, by the role of the output ("joint.output" for several joints), one
+        entry for each reason; the notes state them as well.
     assumed : the notes about assumptions of the signals.yaml.
     columns : number of table columns that are read, including the time; 0 for a bag.
     cut : the record as an analysis uses it, cut where commands are missing; None if it cannot be used.
@@ -97,7 +98,7 @@ class BagReport:
     notes: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
     record: Record | None = None
-    left_out: tuple[LeftOut, ...] = ()
+    left_out: Mapping[str, tuple[LeftOut, ...]] = field(default_factory=dict[str, tuple[LeftOut, ...]])
     cut: Cut | None = None
     columns: int = 0
     assumed: tuple[str, ...] = ()
@@ -137,7 +138,9 @@ class BagReport:
             "notes": list(self.notes),
             "damage": list(self.damage),
             "matters": self.matters,
-            "left_out": [one.to_dict() for one in self.left_out],
+            "left_out": [
+                {**one.to_dict(), "channel": role} for role, found in self.left_out.items() for one in found
+            ],
             "cut": None if self.cut is None else {
                 "gaps": [list(gap) for gap in self.cut.gaps],
                 "stretches": [
@@ -172,8 +175,8 @@ class BagReport:
     def _verdict(self, role: str, channel: ChannelQuality) -> str:
         """Remark on a channel; "flawless" where there is none on it or on the recording."""
         said = channel.complaints()
-        if role == "output" and self.left_out:
-            said.append(f"{sum(one.count for one in self.left_out)} samples are left out")
+        if left_out := self.left_out.get(role):
+            said.append(f"{sum(one.count for one in left_out)} of {left_out[0].total} samples are left out")
         if said:
             return "; ".join(said)
         if self.damage:
@@ -198,7 +201,8 @@ def quality_report(
     problems: list[str] = []
     notes: list[str] = []
     assumed: list[str] = []
-    duration, record, left_out, cut = 0.0, None, (), None
+    left_out: dict[str, tuple[LeftOut, ...]] = {}
+    duration, record, cut = 0.0, None, None
     try:
         parts: dict[str, Record] = {}
         if isinstance(signals, JointSignals):
@@ -209,7 +213,9 @@ def quality_report(
             named = Signals.load(source) if source.suffix in (".yaml", ".yml") else signals
             notes += [] if named is None else read_length_notes(source, named)
             notes += [] if named is None else read_clock_notes(source, named)
-        notes += _of_channels(parts)
+        if record is None:
+            left_out = {f"{begin}output": cleaned(one).left_out for begin, one in parts.items()}
+        notes += _of_channels(parts, left_out)
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             wrapped = wrap_notes(one)  # they are removed and change no result
@@ -225,7 +231,7 @@ def quality_report(
     if record is not None:
         try:
             clean = cleaned(record)
-            left_out, cut = clean.left_out, cut_at_gaps(clean.record)
+            left_out, cut = {"output": clean.left_out}, cut_at_gaps(clean.record)
             notes += [*clean.notes, *cut.notes]
             if (still := standstill(clean.record)) is not None:
                 notes.append(f"output: {still}")
@@ -265,12 +271,16 @@ def quality_report(
     )  # fmt: skip
 
 
-def _of_channels(parts: Mapping[str, Record]) -> list[str]:
-    """Notes on the channels of each part, with its joints; what is told of the channels of all parts alike concerns the recording."""
+def _of_channels(parts: Mapping[str, Record], left_out: Mapping[str, tuple[LeftOut, ...]]) -> list[str]:
+    """Notes on the channels of each part, with its joints, and for joints on what is left out of their outputs; what
+    is told of the channels of all parts alike concerns the recording."""
     said = {begin: one.quality.notes for begin, one in parts.items()}
     own = {begin: [*copy_notes(one), *unsigned_notes(one)] for begin, one in parts.items()}
     if "" in parts:
         return [*said[""], *own[""]]
+    for begin, one in parts.items():
+        own[begin] += placeholder_notes(one)
+        own[begin] += [part.words for part in left_out[f"{begin}output"]]
     alike = [
         note for note in dict.fromkeys(chain(*said.values())) if all(note in one for one in said.values())
     ]

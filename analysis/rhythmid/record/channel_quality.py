@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.record.clock_skew import clock_skew
+from rhythmid.record.placeholder import Placeholder
 from rhythmid.record.quality import ChannelQuality, clipped
 from rhythmid.record.rounding import shown_resolution
 from rhythmid.record.stamp_jitter import stamp_jitter
@@ -21,6 +22,7 @@ def channel_quality(
     stamped: bool,
     missing: int,
     conflicts: int,
+    placeholder: Placeholder | None = None,
 ) -> ChannelQuality:
     """Quality of a channel.
 
@@ -32,6 +34,7 @@ def channel_quality(
     stamped : whether it is the output with its own stamps, whose jitter the samples show; a declared rate gives no
         stamps.
     missing, conflicts : messages without the channel's entry, and duplicates with different values.
+    placeholder : the samples that hold a placeholder, whose value is NaN.
     """
     told = np.isfinite(value)  # infinite values are rejected where they are used
     present = value[told]
@@ -40,7 +43,9 @@ def channel_quality(
     return ChannelQuality(
         source,
         Timing.of(recorded),
-        nan=int(np.isnan(value).sum()),
+        nan=max(0, int(np.isnan(value).sum()) - (0 if placeholder is None else placeholder.count)),
+        placeholders=0 if placeholder is None else placeholder.count,
+        placeholder="" if placeholder is None else placeholder.words,
         clipped=clipped(present),
         missing=missing,
         conflicts=conflicts,

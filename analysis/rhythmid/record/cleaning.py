@@ -106,12 +106,26 @@ def cleaned(record: Record) -> Cleaned:
             limits = f"{values} {channel.unit}".rstrip()
             if bad.mean() > MOSTLY:
                 raise InputError(
-                    f"{record.name}: {100 * bad.mean():.0f} % of the output is clipped at {limits}; choose a wider range of the sensor"
+                    f"{record.name}: {100 * bad.mean():.0f} % of the output is clipped at {limits} or rests there ({channel.source}); choose a "
+                    "wider range of the sensor, or another channel"
                 )
             bad = bad | np.append(bad[1:], False) | np.insert(bad[:-1], 0, False)
         found.append(LeftOut(reason, int(bad.sum()), total, float(channel.time[bad][0]), limits))
         record = replace(record, output=replace(channel, time=channel.time[~bad], value=channel.value[~bad]))
-    return Cleaned(record, tuple(found), (*wraps, *rest_notes(record)))
+    return Cleaned(record, tuple(found), (*placeholder_notes(record), *wraps, *rest_notes(record)))
+
+
+def placeholder_notes(record: Record) -> tuple[str, ...]:
+    """Messages about numbers that stand for no measurement, one for the channels that have the same ones."""
+    roles: dict[tuple[str, int], list[str]] = {}
+    for role, quality in record.quality.channels.items():
+        if quality.placeholders:
+            roles.setdefault((quality.placeholder, quality.placeholders), []).append(role)
+    return tuple(
+        f"{' and '.join(alike)}: {count} samples hold exactly {number}, far beyond all others and without a sample in between: that "
+        "stands for nothing measured, and they are left out"
+        for (number, count), alike in roles.items()
+    )
 
 
 def peak_note(record: Record) -> str | None:

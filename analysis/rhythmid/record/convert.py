@@ -31,14 +31,12 @@ def write_record(record: Record, path: str | Path, joint: str = "joint", storage
     where the record's times are negative or start late. Raises InputError where the bag exists or cannot be
     written, or where the record has an acceleration, which no joint state can hold.
     """
-    namespace = "/" + (re.sub(r"\W+", "_", record.name).strip("_") or "record")
-    if namespace[1].isdigit():
-        namespace = f"/_{namespace[1:]}"
+    namespace = namespace_of(record.name)
     channels = {
         role: one for role, one in record.channels.items() if role != "forcing" or record.forcing_law is None
     }
-    fields = {role: _field(role, record) for role in channels}
-    shift = _shift(record)
+    fields = {role: field_of(role, record) for role in channels}
+    shift = shift_of(record)
     placed = {role: (_topic(role, one, record), fields[role]) for role, one in channels.items()}
     topics: dict[str, Messages] = {}
     for name in dict.fromkeys(topic for topic, _ in placed.values()):
@@ -52,7 +50,14 @@ def write_record(record: Record, path: str | Path, joint: str = "joint", storage
     return made
 
 
-def _field(role: str, record: Record) -> str:
+def namespace_of(name: str) -> str:
+    """The namespace of the topics of a record with this name."""
+    plain = re.sub(r"\W+", "_", name).strip("_") or "record"
+    return f"/_{plain}" if plain[0].isdigit() else f"/{plain}"
+
+
+def field_of(role: str, record: Record) -> str:
+    """The field of a joint state for the channel of a role. Raises InputError for an acceleration."""
     kind = {"input": record.input_kind, "output": record.output_kind}.get(role, role)
     field = {
         "force": "effort", "forcing": "effort", "effort": "effort", "velocity": "velocity", "position": "position",
@@ -74,12 +79,12 @@ def _topic(role: str, channel: Channel, record: Record) -> str:
     if role in TOPICS:
         return TOPICS[role]
     if role == "output" or np.array_equal(channel.time, record.output.time):
-        if role == "output" or _field(role, record) != _field("output", record):
+        if role == "output" or field_of(role, record) != field_of("output", record):
             return STATES
     return f"{STATES}_{role}"
 
 
-def _shift(record: Record) -> float:
+def shift_of(record: Record) -> float:
     """Time [s] that is subtracted from the record's times for the bag's stamps."""
     first = min(float(channel.time[0]) for channel in record.channels.values())
     return 0.0 if 0.0 <= first < RUN_CLOCK else first

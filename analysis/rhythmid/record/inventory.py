@@ -25,6 +25,8 @@ from rhythmid.record.joined_stamps import stamp_pairs
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.message_types import typestore
 from rhythmid.record.other_lengths import length_notes, unequal_arrays
+from rhythmid.record.placeholder import placeholder_of
+from rhythmid.record.sign_bit import sign_bit_of, signed
 from rhythmid.record.signals import Clock
 from rhythmid.record.stated_rate import stated_rate
 from rhythmid.record.table import SUFFIXES, WIDEST, Table, table_suffix
@@ -62,6 +64,7 @@ class Recorded:
     joint : name of its joint, where one is stated.
     side : `left` or `right` where another column's name differs only in that; else empty.
     said : its name within the message or table, such as `position` or the heading without its unit.
+    sign_bit : place of the bit that is the sign of the recorded words; None where they are ordinary numbers.
     unit, scale : SI unit, empty where not stated, and its factor per recorded unit.
     time, value : float64[n], [s] and recorded values times `scale`; a message's time is its receive time.
     stamped : whether its messages have stamps.
@@ -80,6 +83,7 @@ class Recorded:
     written_unit: str = ""
     stamped: bool = False
     side: str = ""
+    sign_bit: int | None = None
 
     def __str__(self) -> str:
         return f"{self.topic} {self.field}" if self.topic else self.column
@@ -184,9 +188,11 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
             notes += (
                 f"{name}: begins again after {turn:.0f}, as an encoder does after a turn: it is taken in rad, scale: 2π/{turn:.0f}",
             )
+        sign_bit = sign_bit_of(value)
+        value = signed(value, sign_bit)
         one = Recorded(
             heading.name, time, value * heading.scale, column=name, unit=heading.unit, scale=heading.scale,
-            written_unit=heading.written,
+            written_unit=heading.written, sign_bit=sign_bit,
         )  # fmt: skip
         if COUNTER.fullmatch(heading.name) and np.ptp(np.diff(value)) == 0.0:
             left.append(f"{name}: counts the rows")
@@ -258,10 +264,16 @@ def _filled(fields: list[Recorded], columns: Columns, begin: int) -> Iterator[Re
     for one in fields:
         field = Field.parse(one.field)
         value = columns.values[field]
-        kept = np.isfinite(value)
+        kept, placeholder = np.isfinite(value), placeholder_of(value)
+        if placeholder is not None:
+            kept &= ~placeholder.where
         time = (columns.log_ns[kept] - begin) * 1e-9
         order = np.argsort(time, kind="stable")
-        yield replace(one, time=time[order], value=value[kept][order], stamped=stamped)
+        value = value[kept][order]
+        sign_bit = sign_bit_of(value)
+        yield replace(
+            one, time=time[order], value=signed(value, sign_bit), stamped=stamped, sign_bit=sign_bit
+        )
 
 
 def _numbers(

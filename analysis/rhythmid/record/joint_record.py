@@ -16,7 +16,7 @@ of one axis; `feedforward` is a force that the controllers add.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -66,13 +66,14 @@ class JointSignals:
 @dataclass(frozen=True, eq=False)
 class JointRecord:
     """One recording of a machine: a record for each joint, and one of the base's joint where the base moves along
-    one. All times have the same zero."""
+    one. All times have the same zero. `scales` are those that the signals state, by role and joint."""
 
     name: str
     joints: Mapping[str, Record]
     base: Record | None = None
     taken: Taken = "before_actuator"
     sampled: Sampled | None = None
+    scales: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
 
     @property
     def every(self) -> dict[str, Record]:
@@ -118,7 +119,12 @@ def read_joint_record(source: str | Path, signals: JointSignals) -> JointRecord:
     its own source."""
     found = {joint: _read(source, one, signals.path) for joint, one in signals.joints.items()}
     base = None if signals.base is None else _read(source, signals.base, signals.path)
-    return JointRecord(next(iter(found.values())).name, found, base, signals.taken, signals.sampled)
+    scales: dict[str, dict[str, float]] = {}
+    for joint, one in signals.joints.items():
+        for role, channel in one.channels.items():
+            scales.setdefault(role, {})[joint] = channel.scale
+    name = next(iter(found.values())).name
+    return JointRecord(name, found, base, signals.taken, signals.sampled, scales)
 
 
 def _read(source: str | Path, signals: Signals, path: Path) -> Record:

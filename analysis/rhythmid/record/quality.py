@@ -27,6 +27,8 @@ class ChannelQuality:
     source : origin of the channel.
     timing : of its samples, as recorded.
     nan : samples that are not a number (NaN, or an empty field of a table) and count as missing.
+    placeholders, placeholder : samples that hold a number for "nothing measured" and count as missing, and that
+        number as recorded; see `placeholder_of`.
     clipped : samples in runs at the largest or smallest value, as caused by a limit.
     missing : messages without the channel's entry, such as those of another joint.
     conflicts : duplicates with different values.
@@ -55,6 +57,8 @@ class ChannelQuality:
     stamp_jitter: float | None = None
     stamp_jitter_std: float | None = None
     resolution: float = 0.0
+    placeholders: int = 0
+    placeholder: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON, including the timing."""
@@ -84,6 +88,7 @@ class ChannelQuality:
             f"{timing.duplicates} duplicates, {self.conflicts} of them with other values": timing.duplicates,
             f"{timing.late} messages out of order": timing.late,
             f"{self.nan} samples are NaN or empty and count as missing": self.nan,
+            f"{self.placeholders} samples hold {self.placeholder} for nothing measured and count as missing": self.placeholders,
             f"{self.clipped} samples look clipped": self.clipped,
             f"{self.missing} messages without this entry": self.missing,
         }

@@ -20,9 +20,11 @@ from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.held_command import with_held_commands, with_hold
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
+from rhythmid.record.placeholder import Placeholder, placeholder_of
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
 from rhythmid.record.record import FEWEST_COMMON_SAMPLES, Channel, Record
+from rhythmid.record.sign_bit import signed
 from rhythmid.record.signals import Signals, Sinusoid, Source
 from rhythmid.record.stale_rows import without_stale_rows
 from rhythmid.record.standstill import is_driven
@@ -41,21 +43,22 @@ MOST_OF_FORMULA = 50_000_000  # samples of it, 400 MB: an hour at 100 Hz has 36 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of one channel as recorded: time [s] and value in the order of recording, and latency [s]."""
+    """Samples of one channel as recorded: time [s] and value in the order of recording, latency [s], messages without
+    it, and its placeholders, whose value is NaN."""
 
     source: Source
     time: NDArray[np.float64]
     value: NDArray[np.float64]
     lateness: NDArray[np.floating] | None = None
     missing: int = 0
+    placeholder: Placeholder | None = None
 
 
 def load_records(
     paths: Iterable[str | Path], signals: Signals | str | Path | None = None, tell: Tell = silent
 ) -> list[Record]:
     """Read several records, with progress messages; see `read_record`."""
-    if isinstance(signals, (str, Path)):
-        signals = Signals.load(signals)
+    signals = Signals.load(signals) if isinstance(signals, (str, Path)) else signals
     given = list(paths)
     return list(counted((read_record(path, signals) for path in given), len(given), "records read", tell))
 
@@ -169,12 +172,11 @@ def read_tables(signals: Signals) -> Record:
         stale |= old
         if merged[source.file] or is_sampled_rarely(value):  # its empty cells are no samples
             time, value = time[~np.isnan(value)], value[~np.isnan(value)]
-        made[role] = Samples(source, time, value)
+        made[role] = Samples(source, time, value, placeholder=table.placeholder(source.column))
     assert signals.path is not None
     name = table_name(signals.path)
-    name = (
-        signals.path.resolve().parent.name if name == "signals" else name
-    )  # the folder's name is more specific
+    if name == "signals":  # the folder's name is more specific
+        name = signals.path.resolve().parent.name
     clocks = {(source.file, source.clock(signals.time)) for source in signals.channels.values()}
     first = min((float(samples.time.min()) for samples in made.values() if len(samples.time)), default=0.0)
     told = [note for table in tables.values() for note in table.notes]
@@ -257,14 +259,17 @@ def _from_columns(
     assert stamp_ns is not None
     kept = ~missing
     lateness = np.asarray((found.log_ns - stamp_ns)[kept] * 1e-9) if stamped else None
-    value = _in_unit(found.values[source.field][kept], source)
-    return stamp_ns[kept], Samples(source, np.empty(0), value, lateness, int(missing.sum()))
+    value = found.values[source.field][kept]
+    if (placeholder := placeholder_of(value)) is not None:
+        value = np.where(placeholder.where, np.nan, value)
+    value = _in_unit(value, source)
+    return stamp_ns[kept], Samples(source, np.empty(0), value, lateness, int(missing.sum()), placeholder)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # for numbers near the largest, and NaN of every kind
 def _in_unit(value: NDArray[np.float64], source: Source) -> NDArray[np.float64]:
     """Values (n,) in SI or model units. Impossible ones, as from damaged bytes, become infinite and are rejected."""
-    value = value * source.scale + source.offset
+    value = signed(value, source.sign_bit) * source.scale + source.offset
     return np.where(np.abs(value) > LARGEST, np.copysign(np.inf, value), value)
 
 
@@ -278,19 +283,26 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         label = f"{samples.source.place}{samples.source}"
         if len(samples.time) == 0:
             raise InputError(f"{label}: is empty")
-        kept = put_in_order(samples.time, label, mend)
+        column = samples.source.clock(signals.time).column
+        kept = put_in_order(samples.time, f"{label} (time: {column})" if column != "" else label, mend)
         time, value = samples.time[kept], samples.value[kept]
         conflicts = _conflicts(samples, time, value)
         absent = np.isnan(value)
         if absent.mean() > MOSTLY:
-            raise InputError(f"{label}: {int(absent.sum())} of {len(value)} samples are NaN or empty")
+            marked = (
+                ""
+                if samples.placeholder is None
+                else f", or {samples.placeholder.words} for nothing measured"
+            )
+            raise InputError(f"{label}: {int(absent.sum())} of {len(value)} samples are NaN or empty{marked}")
         if conflicts > AMBIGUOUS * len(samples.time):
             raise InputError(
                 f"{label}: {conflicts} of {len(samples.time)} samples have the time of another one with another value: "
                 f"two publishers, a clock set back or too coarse stamps; {mend}{_evenly(clocks[role])}"
             )
         judgement[role] = channel_quality(
-            str(samples.source), samples.time, samples.lateness, time, value, stamped and role == "output", samples.missing, conflicts
+            str(samples.source), samples.time, samples.lateness, time, value, stamped and role == "output", samples.missing, conflicts,
+            samples.placeholder,
         )  # fmt: skip
         if absent.any():
             time, value = time[~absent], value[~absent]

@@ -185,6 +185,10 @@ class Record(Result):
             f"{self.name}: {self.duration:.4g} s of {self.output_kind} at {1.0 / self.output.period:.4g} Hz"
         )
 
+    def __repr__(self) -> str:
+        """Headline and channels, without the samples."""
+        return f"<Record {self.headline}; {', '.join(self.channels)}>"
+
     def tables(self) -> Mapping[str, Sequence[Row]]:
         """`channels`: number of samples, rate and source of each."""
         return {
@@ -248,6 +252,8 @@ class Record(Result):
 
         Raises InputError when fewer than 8 samples of the output, or none of another channel, are left.
         """
+        if start >= end:
+            raise InputError(f"{self.name}: use: [{start:g}, {end:g}] s: the start is not before the end")
         parts: dict[str, Channel] = {}
         for role, channel in self.channels.items():
             first, last = np.searchsorted(channel.time, [start - SAME, end - SAME])

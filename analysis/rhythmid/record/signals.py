@@ -12,7 +12,8 @@
 A channel is a field of a topic, or a `column` of a `file` (.mat, .csv, .npz; relative to signals.yaml). `tables:
 {file: …}` names one file for all channels; without a file it is a column of the table that is read. `time:` may
 also be given for a single channel, for example for commands without stamps: `input: {topic: /command, field: data,
-time: receive}`. A channel's value is `scale` * recorded + `offset`, in `unit`. `input: none` declares that at most
+time: receive}`. A channel's value is `scale` * recorded + `offset`, in `unit`. `sign_bit: 15` says that bit 15 of the
+recorded word is its sign. `input: none` declares that at most
 the forcing drives the machine. `forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}` states amplitude * cos(2π
 frequency t + phase) in the record's time. A model parameter with a different value in each record, such as a
 controller's gain, is declared by its value. If one file is used for several records, it is declared by record:
@@ -77,7 +78,8 @@ class Sinusoid:
 class Source:
     """Source of one channel: `field` of `topic`, or `column` of `file`, None for the table that is read.
 
-    `time` is the source of its times, None for that of the whole record.
+    `time` is the source of its times, None for that of the whole record. `sign_bit` is the place of the bit that is
+    the sign of the recorded word, None where it is an ordinary number.
     """
 
     unit: str
@@ -87,6 +89,7 @@ class Source:
     column: str | int = ""
     scale: float = 1.0
     offset: float = 0.0
+    sign_bit: int | None = None
     time: Clock | None = None
     place: str = ""  # "signals.yaml:3: input: ", as the start of a message
 
@@ -239,6 +242,7 @@ class _Channel:
     unit: Annotated[str, AfterValidator(_of_si)] | None = None
     scale: Annotated[Number, AfterValidator(_some)] = 1.0
     offset: Number = 0.0
+    sign_bit: Annotated[int, Limits(ge=1, le=63)] | None = None
 
 
 @dataclass(frozen=True)
@@ -328,7 +332,7 @@ def _source(
     node: Node, role: str, given: _Channel, unit: str, folder: Path, default_file: Path | None
 ) -> Source:
     made = Source(
-        given.unit or unit, scale=given.scale, offset=given.offset, place=f"{node.place}: {role}: ",
+        given.unit or unit, scale=given.scale, offset=given.offset, sign_bit=given.sign_bit, place=f"{node.place}: {role}: ",
         time=None if given.time is None else _clock(node.at("time"), given.time, given.topic is None),
     )  # fmt: skip
     if given.topic is not None:

@@ -19,6 +19,7 @@ from rhythmid.errors import InputError
 from rhythmid.output import require_writable
 from rhythmid.record.grouped_runs import TIME, Runs
 from rhythmid.record.table import Table, table_name
+from rhythmid.record.table_clock import restarting
 
 NUMBERED = re.compile(
     r"(?:.*[._ ])?(?:episode|trial|run|trajectory|segment)(?:[._ ]?(?:index|id|number|nr|no))?", re.IGNORECASE
@@ -48,6 +49,7 @@ def recordings(table: Table, column: str | None = None) -> tuple[str, dict[str, 
         why = f"column {column!r}"
     else:
         time = next((name for name, _ in table.vectors() if TIME.fullmatch(name)), None)
+        time = time or restarting(list(table.vectors()))
         if time is None:
             raise InputError(
                 f"{table.path}: neither a column that numbers recordings nor a time is there; name a column with --by"

@@ -4,8 +4,8 @@
 import math
 import re
 import warnings
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from rhythmid.record.json_table import JSON, read_json
 from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.matlab_objects import complaint_of_objects
 from rhythmid.record.own_process import arrays_in_own_process
+from rhythmid.record.placeholder import Placeholder, without_placeholders
 from rhythmid.record.table_clock import is_called_time
 from rhythmid.record.text_file import COMPRESSED
 from rhythmid.record.text_table import TEXT, text_table
@@ -52,11 +53,13 @@ def table_suffix(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of one file by name, in order, and messages about how it was read, one line each."""
+    """Columns of one file by name, in order, messages about how it was read, one line each, and the placeholders
+    that were read as missing, by column."""
 
     path: Path
     columns: dict[str, Any]
     notes: tuple[str, ...] = ()
+    placeholders: Mapping[str, Placeholder] = field(default_factory=dict[str, Placeholder])
 
     @classmethod
     def load(cls, path: Path) -> "Table":
@@ -84,14 +87,16 @@ class Table:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
         except Exception as error:  # the readers may raise any exception on damaged .mat and .npz files
             raise InputError(f"{path}: cannot be read as a table: {' '.join(str(error).split())}") from None
-        return cls(
-            path,
-            {
-                name: unwrapped(one) if is_called_time(name) else _upright(one)
-                for name, one in columns.items()
-            },
-            notes,
-        )
+        times = {name: unwrapped(one) for name, one in columns.items() if is_called_time(name)}
+        others = {name: _upright(one) for name, one in columns.items() if name not in times}
+        told, placeholders = without_placeholders(others)
+        return cls(path, {name: {**times, **told}[name] for name in columns}, notes, placeholders)
+
+    def placeholder(self, name: str | int) -> Placeholder | None:
+        """The placeholders of a column, named as for `column`; None where it has none."""
+        if isinstance(name, int) and str(name) not in self.columns:
+            name = list(self.columns)[name]
+        return self.placeholders.get(str(name))
 
     def vectors(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
         """Columns of numbers by name; arrays are split into columns."""

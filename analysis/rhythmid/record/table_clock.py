@@ -37,6 +37,8 @@ SERIAL_DAYS = (36526.0, 73051.0)
 DATED = (946684800.0, 4102444800.0)  # seconds since 1970 of the same years
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))  # in which times are written
 NANOSECOND = 1e-9  # [s] smallest unit in which times are written
+# rows of a run from which on a column that begins anew holds several; fewer are the rest of a buffer (`stale_rows`)
+SHORTEST_RUN = 20
 MOSTLY_FORWARD = 0.9  # the same for a time that restarts with each of several recordings
 
 
@@ -97,6 +99,39 @@ def is_even(value: Array) -> bool:
     return in_any_unit and float(np.mean(np.abs(step - usual) <= USUAL_STEP_DEVIATION * usual)) >= USUAL
 
 
+def row_of_restart(value: Array) -> int | None:
+    """Index of the first row in which a time begins anew, at about its first value, after a run of some length; None
+    where there is none."""
+    step = np.diff(value)
+    usual = float(np.median(step)) if len(step) else 0.0
+    near = value[1:] <= value[0] + SHORTEST_RUN * usual
+    back = 1 + np.flatnonzero((step < 0.0) & near)
+    return int(back[0]) if len(back) and back[0] >= SHORTEST_RUN else None
+
+
+def restarting(columns: Sequence[tuple[str, Array]]) -> str | None:
+    """Name of the column that holds the time by its name or its steps and begins anew; None where none does."""
+    return next(
+        (
+            name
+            for name, value in columns
+            if (is_called_time(name) or _is_untold_time(name, value))
+            and np.isfinite(value).all()
+            and row_of_restart(value) is not None
+        ),
+        None,
+    )
+
+
+def _refuse_restart(path: Path, name: str, value: Array) -> None:
+    """Raise InputError where the column that holds the time begins anew."""
+    if (row := row_of_restart(value)) is not None:
+        raise InputError(
+            f"{path}: the time, {name!r}, begins anew in row {row + 1}, so that several recordings are in one table; take them apart with  "
+            f"rhythmid split {path} --out runs"
+        )
+
+
 def has_time(columns: Sequence[tuple[str, Array]]) -> bool:
     """Whether one of the numeric columns is taken as the time."""
     return any(is_time(name, value) for name, value in columns) or any(
@@ -120,9 +155,11 @@ def table_clock(
         columns, key=lambda column: (not _is_plain_time(column[0]), _is_coarse(column[1]))
     ):
         if is_time(name, value):
+            _refuse_restart(path, name, value)
             return named_clock(name, value)
     for name, value in columns:
         if _is_untold_time(name, value):
+            _refuse_restart(path, name, value)
             scale, why = _guessed_scale(value)
             return Clock(
                 "column", column=name, scale=scale

@@ -32,6 +32,7 @@ TEXT = (".csv", ".tsv", ".txt", ".dat", ".lvm", ".log")
 SEPARATORS = ("\t", ";", ",", None)  # None: any number of spaces; in this order of preference
 LOOKED_AT = 200  # lines used to detect the dialect: more than any head has
 UNIT_OR_END = re.compile(r"(\s*[\[({<][^\[({<]*)?$")  # end of a column's name
+LONGEST_LABEL = 3  # words before the colon of a labelled comment: `Names of columns: t y u`
 ACROSS = 10  # ratio of columns to rows above which the lines of a table without names are its columns
 
 
@@ -230,11 +231,30 @@ def _unnamed(before: list[str], separator: str | None, rows: list[list[str]]) ->
 
 def _remark(lines: list[str], separator: str | None, count: int) -> list[str] | None:
     """Names, and units, in the last comment lines with as many entries as there are columns."""
-    remarks = [line.strip() for line in lines if line.lstrip()[:1] in COMMENTS]
-    told = [cells_of(line.lstrip("#% "), separator) for line in remarks if line.lstrip("#% ")]
+    remarks = [line.strip().lstrip("#% ") for line in lines if line.lstrip()[:1] in COMMENTS]
+    told = [_named_cells(line, separator, count) for line in remarks if line]
     while told and len(told[-1]) != count:
         told.pop()
     return names_of(told, count)
+
+
+def _named_cells(line: str, separator: str | None, count: int) -> list[str]:
+    """Cells of a comment line. Where these are not `count`, those of the line after a label such as `Columns:`, with
+    another separator where necessary."""
+    cells = cells_of(line, separator)
+    if len(cells) == count:
+        return cells
+    label, _, rest = line.partition(":")
+    if not rest.strip() or len(label.split()) > LONGEST_LABEL or not label.strip():
+        return cells
+    fitting = (cells_of(rest.strip(), one) for one in dict.fromkeys((separator, *SEPARATORS)))
+    return next((one for one in fitting if count > 1 and len(one) == count and _may_be_names(one)), cells)
+
+
+def _may_be_names(cells: list[str]) -> bool:
+    """Whether cells are distinct and none is a number or empty, unlike the values that a label may have, too."""
+    plain = all(cell and not is_number(cell, ".") for cell in cells)
+    return plain and len(set(cells)) == len(cells)
 
 
 def _first_row(rows: list[list[str]], numbers: list[int], decimal: str) -> int:

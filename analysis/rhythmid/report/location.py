@@ -8,7 +8,16 @@ import numpy as np
 from rhythmid.report.blocks import Block, Bullets, Columns, Drawing, Fold, Paragraph, Section, drawing
 from rhythmid.report.chart import Chart, Curve
 from rhythmid.report.findings import ElementScore, Findings, FreeFunction
-from rhythmid.report.quantity import number, percent, plain, pretty_unit, scaled, sentence, with_unit
+from rhythmid.report.quantity import (
+    number,
+    percent,
+    plain,
+    pretty_unit,
+    remaining_error,
+    scaled,
+    sentence,
+    with_unit,
+)
 from rhythmid.report.row_chart import Bar, draw_bars
 from rhythmid.report.run import worst_place
 from rhythmid.report.signal_path import SlotContent, draw_signal_path
@@ -134,7 +143,14 @@ def unknown_section(found: Findings) -> Section:
     """The remainder of the named effects: its share of the mismatch, the quantity on which it depends, and its curve over that quantity."""
     left = found.result["remainder"]
     verdict = found.result["verdict"]
-    if left["significant"]:
+    if left["significant"] and verdict == "consistent":
+        fit = found.result["fit"]["refitted_nominal"]
+        error = fit["train_nrmse"] if fit["heldout_nrmse"] is None else fit["heldout_nrmse"]
+        said = (
+            f"Nothing of practical size is left: {remaining_error(error, found.result['scoring']['kind'])}. Part of it is more than "
+            f"chance and depends on {left['goes_with']}."
+        )
+    elif left["significant"]:
         said = (
             f"The final model leaves {percent(left['share'])} of the mismatch, by more than chance. What is left depends on "
             f"{left['goes_with']}."

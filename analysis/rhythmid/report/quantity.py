@@ -136,6 +136,16 @@ def rounded(value: float, std: float | None) -> str:
     return f"{value if value else 0.0:.{max(places, 0)}f}"  # no minus zero
 
 
+def with_std(value: float, std: float | None) -> str:
+    """A value ± its standard deviation, plain text for a terminal; without one the value alone."""
+    return rounded(value, std) + ("" if std is None else f" ± {std:.2g}")
+
+
+def written_percent(share: float | None) -> str:
+    """A share in percent, plain text for a terminal; a dash where there is none."""
+    return NONE if share is None else f"{number(100.0 * share, 3)} %"
+
+
 def estimate(value: float | None, std: float | None, unit: str, factor: float = 1.0) -> str:
     """An estimate with its 95 % interval, both multiplied by `factor` to reach `unit`.
 
@@ -161,6 +171,11 @@ def percent(ratio: float | None, half: float | None = None) -> str:
     return f"{number(100.0 * ratio, 3)}\u202f%"
 
 
+def remaining_error(error: float, scoring: str) -> str:
+    """The error of a model that lacks nothing, as a share of what is scored."""
+    return f"the model misses {number(100.0 * error, 2)} % of the {'effort' if scoring == 'effort' else 'motion'}"
+
+
 def probability(value: float | None) -> str:
     """A probability in percent. Evidence never gives exactly 0 or 1, so very small and very large probabilities are stated as bounds."""
     if value is None or math.isnan(value):
@@ -176,3 +191,8 @@ def scaled(size: float, unit: str) -> tuple[float, str]:
         return 1.0, unit
     step, prefix = next(((s, p) for s, p in PREFIXES if size >= s), PREFIXES[-1])
     return 1.0 / step, f"{prefix}{unit}"
+
+
+def averaged_words(count: int) -> str:
+    """What an error refers to where `count` successive samples are averaged: single ones scatter more. Nothing where these are compared."""
+    return f" (of means of {count} samples)" if count > 1 else ""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rhythmid.record.inventory import Recorded
+from rhythmid.start.derivative_words import order_of, words_of_order
 
 Quantity = Literal["position", "velocity", "acceleration", "effort"]
 BY_UNIT: dict[str, Quantity] = {
@@ -19,10 +20,10 @@ WORDS: dict[Quantity, frozenset[str]] = {
         "position positions pos angle angles theta phi psi alpha pose height distance displacement disp deflection extension "
         "length travel rotation translation posicion posizione posicao angulo angolo winkel weg lage".split()
     ),
-    "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel gyro gyr gyroscope "
+    "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx dy dz ydot zdot angvel gyro gyr gyroscope "
         "velocidad velocita velocidade vitesse geschwindigkeit drehzahl".split()),
     "acceleration": frozenset(
-        "acceleration accelerations accel accl acceler acc linacc ddq qdd xddot ddx accelerometer aceleracion "
+        "acceleration accelerations accel accl acceler acc linacc ddq qdd xddot ddx ddy ddz accelerometer aceleracion "
         "accelerazione aceleracao beschleunigung".split()
     ),
     "effort": frozenset(
@@ -30,20 +31,28 @@ WORDS: dict[Quantity, frozenset[str]] = {
         "moment iq drehmoment kraft strom spannung couple coppia fuerza forza forca corriente corrente courant tensione tensao".split()
     ),
 }  # fmt: skip
+MOTIONS: tuple[Quantity, ...] = (
+    "position",
+    "velocity",
+    "acceleration",
+)  # each the derivative of the one before
 DEVICES: dict[str, Quantity] = {
     "encoder": "position",
     "encoders": "position",
     "enc": "position",
     "load": "effort",  # of a load cell; the angle of a load is no effort
 }  # quantities measured by a device, where no word states the quantity
-GAUGES = frozenset(
-    "cell cells gauge gauges strain".split()
-)  # whose volts are those of a bridge, and no driving signal
+# whose volts are those of a bridge, and no driving signal
+GAUGES = frozenset("cell cells gauge gauges strain".split())
 PULSED = frozenset("servo servos esc throttle pulse pulses".split())  # sent as the width of a pulse
 LETTERS: dict[str, Quantity] = {  # conventional meaning of a single letter, where nothing else is stated
     "q": "position", "x": "position", "y": "position", "z": "position", "v": "velocity", "w": "velocity", "a": "acceleration",
     "u": "effort", "f": "effort", "i": "effort", "t": "effort",
 }  # fmt: skip
+# a name with a `d` before one of these is that of a derivative
+MOTION = (
+    WORDS["position"] | WORDS["velocity"] | {letter for letter, one in LETTERS.items() if one == "position"}
+)
 COMMANDED = frozenset(
     "des desired cmd cmds command commands commanded ref refs reference references target targets goal goals setpoint setpoints sp set "
     "demand demands demanded excitation request requests requested soll sollwert consigne consigna referencia riferimento".split()
@@ -52,9 +61,8 @@ COMMANDED_LETTERS = frozenset("u r".split())
 # a controller's output, for an effort; the short words for a force also denote a contact's or a centre's
 CONTROLLED = frozenset("controller control ctrl contr ctl".split())
 CONTROLLED_SHORT = frozenset("con ctr".split())
-COMMANDED_COLUMNS = frozenset(
-    "action actions".split()
-)  # commanded by a policy; in a topic it denotes a ROS action
+# commanded by a policy; in a topic it denotes a ROS action
+COMMANDED_COLUMNS = frozenset(["action", "actions"])
 MEASURED = frozenset(
     "meas measured sensed act actual state states observation feedback fb est estimated present real raw filt filtered smoothed response "
     "encoder encoders enc ist istwert mesure medido medida misurato".split()
@@ -82,7 +90,7 @@ ROTARY = frozenset(
     "angolo couple coppia odrv odrive moteus dynamixel dxl rotor".split()
 )
 LINEAR = frozenset(
-    "force forces height displacement disp x z slide slider prismatic linear leg lift rail cart piston travel extension length"
+    "force forces height displacement disp x z slide slider prismatic linear leg lift rail cart trolley carriage piston travel extension length"
     " deflection elevator kraft weg fuerza forza forca".split()
 )  # fmt: skip
 POSED = frozenset(
@@ -183,7 +191,9 @@ def is_measured_effort(one: Recorded) -> bool:
 
 def is_ignored(one: Recorded) -> bool:
     """Whether its name says that it is neither a motion nor a driving signal."""
-    return bool({*words_of(one.said), *words_of(one.topic)} & IGNORED)
+    near = words_of(one.said)
+    of_effort = _plain_quantity(one, near, [])[0] == "effort" and order_of(near, MOTION)[0] > 0
+    return bool({*near, *words_of(one.topic)} & IGNORED) or derivative_of(one) >= len(MOTIONS) or of_effort
 
 
 def is_counted(one: Recorded) -> bool:
@@ -196,20 +206,29 @@ def is_no_effort(one: Recorded) -> bool:
     return bool({*words_of(one.said), *words_of(one.topic)} & NO_EFFORT)
 
 
-def rotary_of(one: Recorded) -> tuple[bool | None, str]:
-    """Whether the quantity is rotational (True) or translational (False), and the word or unit that says so."""
+def rotary_of(one: Recorded, by_topic: bool = True) -> tuple[bool | None, str]:
+    """Whether the quantity is rotational (True) or translational (False), and the word or unit that says so; `by_topic` also
+    its topic's words, the weakest of all: `joint_states` is what every robot's topic is called."""
     if one.unit in ("rad", "rad/s", "rad/s^2", "N*m"):
         return True, f"its unit is {one.written_unit}"
     if one.unit in ("m", "m/s", "m/s^2", "N"):
         return False, f"its unit is {one.written_unit}"
     if force_unit_of(one) in ELECTRICAL and meaning_of(one).quantity == "effort":
         return True, "it feeds a motor"
-    for word in [*words_of(one.said), *words_of(one.joint), *words_of(one.topic)]:
+    for word in [*words_of(one.said), *words_of(one.joint), *(words_of(one.topic) if by_topic else ())]:
         if word in LINEAR:
             return False, f"its name says {word!r}"
         if word in ROTARY:
             return True, f"its name says {word!r}"
     return None, ""
+
+
+def rotary_of_wrench(one: Recorded) -> tuple[bool | None, str]:
+    """As `rotary_of`, for a field of a wrench: a force in N or a torque in N*m, by REP 103."""
+    words = words_of(one.field) if one.type.rpartition("/")[2] in ("Wrench", "WrenchStamped") else []
+    if "torque" in words:
+        return True, "a wrench's torque is in N*m"
+    return (False, "a wrench's force is in N") if "force" in words else (None, "")
 
 
 def force_unit_of(one: Recorded) -> str:
@@ -315,7 +334,27 @@ def _controlled(one: Recorded, near: list[str]) -> set[str]:
     return words & (CONTROLLED if of_force else CONTROLLED | CONTROLLED_SHORT)
 
 
+def derivative_of(one: Recorded) -> int:
+    """Order of the derivative of a position that its name states; 0 where it states none. Above 2 it is no motion
+    that a sensor measures."""
+    near = words_of(one.said)
+    order, _ = order_of(near, MOTION)
+    plain = _plain_quantity(one, near, words_of(one.topic))[0]
+    # theta_dot_vel says twice that it is a velocity
+    of_position = plain not in MOTIONS or not WORDS["position"].isdisjoint(near)
+    return order if not order or of_position else order + MOTIONS.index(plain)
+
+
 def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity | None, str, bool]:
+    plain, order = _plain_quantity(one, near, far), derivative_of(one)
+    if not order or one.unit in BY_UNIT or plain[0] == "effort":
+        return plain
+    said = f"its name says {order_of(near, MOTION)[1]!r}"
+    return MOTIONS[order] if order < len(MOTIONS) else None, said, True
+
+
+def _plain_quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity | None, str, bool]:
+    """The quantity, its reason and whether it is certain, without the words for a derivative."""
     if one.unit in ELECTRICAL and (motion := _motion_word(near)):
         return motion[1], f"its name says {motion[0]!r}, and a sensor's volts or amperes are no effort", True
     if one.unit in ELECTRICAL and (gauge := set(near) & GAUGES):
@@ -362,8 +401,8 @@ def _one(words: list[str], known: Collection[str]) -> str:
 def joint_of_column(said: str, side: str = "", names: Collection[str] = ()) -> str:
     """The part of a name that distinguishes a column from others of the same quantity: `3` of dof_pos[3], `knee` of
     knee_pos. `names` are words that are names here."""
-    known = WITH_MEANING | set(LETTERS)
     words = words_of(said)
+    known = WITH_MEANING | set(LETTERS) | words_of_order(words)
     if set(words) & (WORDS["effort"] - FORCES):
         known |= CONTROLLED_SHORT
     left = [word for word in words if word in names or word not in known]

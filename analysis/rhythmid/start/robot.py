@@ -148,14 +148,26 @@ def _all_beside(
 
 
 def _effort(families: Sequence[Family], output: Family) -> tuple[Family | None, list[Family], list[str]]:
-    """The effort that was not commanded, preferably a sensor reading; the other efforts; and a note on each effort without its sign."""
+    """The effort that was not commanded, preferably a force and a sensor reading, not a current; the other efforts; and
+    a note on each effort without its sign. A force that never acts at any joint gives way to a current."""
     able = sorted(
-        _all_beside(families, "effort", False, output), key=lambda one: not says_it_was_read(one.first)
+        _all_beside(families, "effort", False, output),
+        key=lambda one: (_idle(one), _is_current(one), not says_it_was_read(one.first)),
     )
     references = list(_all_beside(families, "position", True, output))
     notes = {one.pattern: unsigned_family(one, output, references[:1]) for one in able}
     able = [one for one in able if not notes[one.pattern]]
     return (able[0] if able else None), able[1:], [note for note in notes.values() if note]
+
+
+def _idle(family: Family) -> bool:
+    """Whether no effort of a family ever acts."""
+    return not any(np.any(one.value) for one in family.members.values())
+
+
+def _is_current(family: Family) -> bool:
+    """Whether a family is called a current, or is in amperes."""
+    return family.first.unit == "A" or bool(CURRENTS & set(words_of(family.pattern.lower())))
 
 
 def _other_numbers(families: Sequence[Family], output: Family) -> str:
@@ -185,8 +197,11 @@ def _doubts_of_effort(effort: Family | None, others: Sequence[Family], command: 
         ]
     doubts: list[str] = []
     if still := [name for name, one in effort.members.items() if not np.any(one.value)]:
-        doubts.append(f"effort: that of {', '.join(still)} is always 0, as where no motor acts")
-    if not effort.first.unit and CURRENTS & set(words_of(effort.pattern.lower())):
+        doubts.append(
+            f"effort: that of {', '.join(still)} is always 0, as where no motor acts; where one acts whose effort was not "
+            "recorded, nothing that is said of these joints holds"
+        )
+    if not effort.first.unit and _is_current(effort):
         doubts.append(
             f"effort: {effort.pattern} is called a current; where it is in A, give it the torque or force of one ampere at each joint, such as  "
             "scale: {JOINT: 10}"

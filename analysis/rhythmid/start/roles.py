@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -23,11 +24,14 @@ from rhythmid.start.meaning import (
     is_lone_v,
     meaning_of,
     rotary_of,
+    rotary_of_wrench,
     says_who_asks,
 )
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along, runs_like_a_clock
 from rhythmid.start.role_choice import Ask, Choice, Known, pick, ranked_by_worth
+from rhythmid.start.slopes import without_slopes
 from rhythmid.start.step_before import BEFORE, duty_before, gone_to_set_point, set_point_before, step_before
+from rhythmid.start.symbols import with_symbols
 from rhythmid.start.targets import with_targets
 from rhythmid.start.unnamed_joints import column_groups
 from rhythmid.start.unnamed_reference import with_reference
@@ -64,7 +68,7 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     known = [
         Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one) and not _is_clock(one)
     ]
-    known = _without_empty_letters(known)
+    known = without_slopes(with_symbols(_without_empty_letters(known)))
     everything = [*known, *(Known(one, meaning_of(one)) for one in found.constant)]
     known, resting = (with_targets(part, everything) for part in (known, everything[len(known) :]))
     if not known:
@@ -313,10 +317,11 @@ def _degrees(ratio: float) -> str:
 def _rotary(choices: Mapping[str, Choice], output: Recorded, of_robot: bool, ask: Ask) -> tuple[bool, str]:
     """Whether the machine is rotational, by units and names; a joint of several, or of a JointState, is rotational
     by default."""
-    for choice in choices.values():
-        rotary, why = rotary_of(choice.recorded)
-        if rotary is not None:
-            return rotary, f"{choice.recorded}: {why}"
+    for judge in (partial(rotary_of, by_topic=False), rotary_of_wrench, rotary_of):
+        for choice in choices.values():
+            rotary, why = judge(choice.recorded)
+            if rotary is not None:
+                return rotary, f"{choice.recorded}: {why}"
     turns = of_robot or output.type == "sensor_msgs/msg/JointState"
     answers = ["it turns (rad, N m)", "it slides (m, N)"]
     number = ask("Does the joint turn or slide?", answers if turns else answers[::-1])

@@ -14,6 +14,7 @@ from rhythmid.record.angle_wrap import unwrapped, wraps_of
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.inventory import Inventory, inventory
 from rhythmid.record.read import load_records, read_record
+from rhythmid.record.record import Record
 from rhythmid.record.rest_at_ends import rests_of, use_line
 from rhythmid.record.signals import Clock, Signals
 from rhythmid.record.standstill import standstill
@@ -27,7 +28,7 @@ from rhythmid.start.other_effort import by_other_effort
 from rhythmid.start.role_choice import Ask
 from rhythmid.start.roles import Roles, first_answer, guess_roles
 from rhythmid.start.sides import with_sides
-from rhythmid.start.yaml_text import GUESSED, as_guessed, clock_of, model_yaml, signals_yaml
+from rhythmid.start.yaml_text import GUESSED, as_guessed, clock_of, doubt_of_sign, model_yaml, signals_yaml
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
 
@@ -58,6 +59,11 @@ class Guess:
         choices = self.roles.choices.items()
         found = [f"{role}: {choice.recorded}: {choice.reason}" for role, choice in choices]
         found += [f"CHECK {role}: {doubt}" for role, choice in choices for doubt in choice.doubts]
+        found += [
+            f"CHECK {role}: {doubt_of_sign(choice.recorded.sign_bit)}"
+            for role, choice in choices
+            if choice.recorded.sign_bit is not None
+        ]
         found += [f"CHECK {note}" for note in (*self.inventory.notes, *self.roles.notes)]
         if self.roles.joint.others:
             found.append(f"joint: {self.roles.joint.name} (others: {', '.join(self.roles.joint.others)})")
@@ -103,7 +109,46 @@ def guess(
 ) -> Guess:
     """Inspect one recording and guess the roles of its channels; parameters and errors as for `start`."""
     found = with_joints(with_sides(with_listed_joints(_inventory(source, rate))))
-    roles = guess_roles(found, joint, ask)
+    tried = _tried(source, found, guess_roles(found, joint, ask))
+    others = tried.roles.joint.others if joint is None else []
+    first = tried.refused
+    while (
+        first and tried.refused and others
+    ):  # a guess that cannot be used gives way to the joint that moves next
+        tried = _tried(source, found, guess_roles(found, others.pop(0), ask))
+    if first and tried.refused:
+        raise InputError(f"{first}; {_other_choice(found, joint)}")
+    roles, text, record, clock, reason = tried.roles, tried.text, tried.record, tried.clock, tried.reason
+    assert record is not None
+    if first:
+        note = f"joint {roles.joint.name} is taken, because that which moves most cannot be used: {first}"
+        roles = replace(roles, notes=(*roles.notes, note))
+        text = signals_yaml(found, roles, _units(roles), clock, reason)
+    clean = cleaned(record).record
+    still = standstill(clean)
+    doubts = [one for one in (still, wraps_of(record), *rests_of(clean)) if one is not None]
+    if doubts:
+        output = roles.choices["output"]
+        output = replace(output, doubts=(*output.doubts, *doubts))
+        roles = replace(roles, choices={**roles.choices, "output": output})
+        text = signals_yaml(found, roles, _units(roles), clock, reason, use_line(clean))
+    return Guess(found, roles, text, still is None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """Roles with the text of their signals.yaml, the record and its clock; or why the output is `refused`."""
+
+    roles: Roles
+    text: str
+    clock: Clock
+    reason: str
+    record: Record | None
+    refused: str = ""
+
+
+def _tried(source: str | Path, found: Inventory, roles: Roles) -> _Tried:
+    """The record with these roles. Raises InputError where it cannot be read for a reason other than its output."""
     units = _units(roles)
     clock, reason = clock_of(found, roles)
     text = signals_yaml(found, roles, units, clock, reason)
@@ -115,15 +160,22 @@ def guess(
         clock, reason = Clock("receive"), f"the stamps do not serve: {error}"
         text = signals_yaml(found, roles, units, clock, reason)
         record = read_record(source, Signals.from_text(text, GUESSED))
-    clean = cleaned(record).record
-    still = standstill(clean)
-    doubts = [one for one in (still, wraps_of(record), *rests_of(clean)) if one is not None]
-    if doubts:
-        output = roles.choices["output"]
-        output = replace(output, doubts=(*output.doubts, *doubts))
-        roles = replace(roles, choices={**roles.choices, "output": output})
-        text = signals_yaml(found, roles, units, clock, reason, use_line(clean))
-    return Guess(found, roles, text, still is None)
+    try:
+        cleaned(record)
+    except InputError as error:
+        return _Tried(roles, text, clock, reason, None, str(error))
+    return _Tried(roles, text, clock, reason, record)
+
+
+def _other_choice(found: Inventory, joint: str | None) -> str:
+    """How to choose another output than the guessed one."""
+    told = [one for one in (meaning_of(each).joint for each in found.recorded) if one]
+    names = ", ".join(dict.fromkeys(one for one in told if one != joint))
+    return (
+        f"another joint is chosen with --joint NAME ({names})"
+        if names
+        else "write signals.yaml with another output"
+    )
 
 
 def _guess_of_moving(

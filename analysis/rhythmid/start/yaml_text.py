@@ -176,6 +176,8 @@ def _channel(role: str, one: Recorded, roles: Roles, units: Units, bag: bool) ->
         [f"topic: {one.topic}, field: {_quoted(one.field)}"] if bag else [f"column: {_quoted(one.column)}"]
     )
     parts.append(f"unit: {json.dumps(_unit(role, one, roles, units))}{_scale(one.scale)}")
+    if one.sign_bit is not None:
+        parts.append(f"sign_bit: {one.sign_bit}")
     if role == "output" and roles.output_kind != "position":
         parts.append(f"kind: {roles.output_kind}")
     if role == "input":
@@ -256,11 +258,22 @@ def _said(role: str, choice: Choice) -> list[str]:
     lines = comment(f"{role}, {MEANS[role]}: {choice.reason}.")
     if one.scale != 1.0:
         lines += comment(f"  scale: its heading says {one.written_unit}.")
+    if one.sign_bit is not None:
+        lines += comment(f"  CHECK: {doubt_of_sign(one.sign_bit)}.")
     for doubt in choice.doubts:
         lines += comment(f"  CHECK: {doubt}.")
     if choice.others:
         lines += comment(f"  or else: {_listed([str(other) for other in choice.others], LISTED)}.")
     return lines
+
+
+def doubt_of_sign(bit: int) -> str:
+    """Doubt about a number that seems to be a word with a sign bit."""
+    size = 2**bit
+    return (
+        f"its numbers jump between those near 0 and those above {size}, as words do whose bit {bit} is their sign: sign_bit: {bit} takes "
+        f"{size + 32} for -32; delete it where they are ordinary numbers"
+    )
 
 
 def _listed(names: Sequence[str], most: int) -> str:

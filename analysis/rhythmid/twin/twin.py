@@ -18,6 +18,7 @@ from rhythmid.twin.detector import Threshold
 from rhythmid.twin.isolation import DelayNow, Isolation, delays_now, isolate
 from rhythmid.twin.lateness import LOOK, Doubt, possible_lateness
 from rhythmid.twin.observer import Observer
+from rhythmid.twin.outliers import WithoutOutliers
 from rhythmid.twin.released import Released
 from rhythmid.twin.samples import Samples
 from rhythmid.twin.score import Score, Whitener
@@ -84,6 +85,7 @@ class Twin:
         self.samples: dict[Role, Samples] = {"input": Samples(), "output": Samples()}
         if forced:
             self.samples["forcing"] = Samples()
+        self._measured = WithoutOutliers(keep=settings.output_kind == "acceleration")
         self._released = Released(_delay(self.model, DELAYS[0])) if released else None
         self._catalogue = load_catalogue() if catalogue is None else catalogue
         self._taken = 0  # measurements of the buffer that have been judged
@@ -99,6 +101,8 @@ class Twin:
         into = self.samples.get(role)
         if self._released is not None and role in ("input", "released"):
             into = self._released.given if role == "input" else self._released.released
+        if role == "output":
+            into = self._measured.given
         if into is not None:
             into.append(np.asarray(time, dtype=float), np.asarray(value, dtype=float))
 
@@ -108,6 +112,7 @@ class Twin:
         Raises InputError when the healthy stretch is over and shows no motion, or a motion that the model does not reproduce.
         """
         output = self.samples["output"]
+        output.append(*self._measured.take())
         if self._released is not None:
             self.samples["input"].append(*self._released.take(output.newest - PATIENCE))
         if self.calibration is None:
@@ -131,7 +136,12 @@ class Twin:
     @property
     def refused(self) -> int:
         """Samples left out, not finite or not newer than the one before."""
-        return sum(one.refused for one in self.samples.values())
+        return self._measured.given.refused + sum(one.refused for one in self.samples.values())
+
+    @property
+    def outliers(self) -> int:
+        """Measurements left out because they stand far off their neighbours."""
+        return self._measured.left_out
 
     def _complete(self, time: float) -> bool:
         """Whether all signals up to a time are known, or silent, and so are the later measurements that determine lateness."""

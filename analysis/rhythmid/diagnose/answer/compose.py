@@ -19,13 +19,21 @@ from rhythmid.diagnose.answer.result import (
     Remainder,
     Scored,
     Untried,
+    settled,
 )
 from rhythmid.diagnose.answer.untold import without_untold
-from rhythmid.diagnose.answer.wording import freed_value, location_of, recalibrated, summary_of
+from rhythmid.diagnose.answer.wording import (
+    freed_value,
+    location_of,
+    recalibrated,
+    summary_of,
+    unstated_delay,
+)
 from rhythmid.diagnose.case import EXPLAINED, Case
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.identify.held_out_zeros import held_out_zero_notes
@@ -37,6 +45,7 @@ from rhythmid.identify.series import Series
 from rhythmid.identify.zero_estimates import zeros_told
 from rhythmid.model import Model
 from rhythmid.record.record import Record
+from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 SHOWN = 8  # alternatives listed
@@ -70,22 +79,25 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     """The diagnosis."""
     found, decision, contest = result.search, result.decision, result.contest
     series = found.fit.run.series
-    repeats = noise_from_repeats(list(series))
+    repeats = noise_from_repeats(series)
     best = found.best
     fit = found.fit
     missing = missing_effects(fit.model, decision, lambda name: estimated(fit, name))
     missing = without_untold(missing, fit.model, scales(series, fit.model))
     plain = FitQuality(found.nominal.nrmse(), contest.nominal.heldout_nrmse)
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
-    rivals = [t for t in found.trials if len(t.added) == len(best.added) and t.bic() - best.bic() < RIVALS]
-    heldout = {tuple(sorted(one.elements)): one.heldout_nrmse for one in contest.hypotheses}
+    groups = _indistinguishable(found.fit.model, decision)
+    rivals = [one for one in found.trials if _rivals(one, best, groups)]
+    case.tell("choosing the next experiment")
+    needed = decision.verdict != "consistent" and not settled(decision.verdict, groups)
+    heldout = {one.key: one.heldout_nrmse for one in contest.hypotheses}
     alternatives = tuple(
         Alternative(
             tuple(t.element(label).name for label in t.added),
             t.bic() - best.bic(),
-            heldout.get(tuple(sorted(t.added))),
+            heldout.get(t.key),
         )
-        for t in [t for t in found.trials if set(t.added) != set(best.added)][:SHOWN]
+        for t in [t for t in found.trials if t.key != best.key][:SHOWN]
     )
     part = "record" if result.scoring.kind == "free_run" else "window"
     drawn = {one.quantity: (one.grid, one.force) for one in result.after}
@@ -108,7 +120,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         location=location_of(found, missing, result.before, decision.verdict),
         missing=missing,
         joint_probability=decision.joint,
-        indistinguishable=_indistinguishable(found.fit.model, decision),
+        indistinguishable=groups,
         alternatives=alternatives,
         hypotheses=explanations(contest, decision),
         rejections=result.selection.rejections,
@@ -117,15 +129,14 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         parameters={name: estimated(fit, name) for name in fit.model.parameters},
         delays=delays_of(fit),
         next_experiment=(
-            MORE_TIME
-            if case.budget.passed(EXPLAINED)
-            else next_experiment(found, rivals, series, decision.verdict)
+            MORE_TIME if case.budget.passed(EXPLAINED) else next_experiment(found, rivals, series, needed)
         ),
-        scoring=Scored(result.scoring.kind, None, result.scoring.reason),
+        scoring=Scored(result.scoring.kind, None, result.scoring.reason, series[0].block),
         calibration=(
             *result.calibration.notes,
             *zeros_told(fit),
             *recalibrated(case.nominal, fit.model, {name: fit.std[name] for name in fit.names}),
+            *_delay_told(case.nominal, fit, result.selection.chosen.elements),
         ),
         excluded=tuple(Untried(" + ".join(added), why) for added, why in found.excluded),
         heldout=held_out_words(case.holdout, f"the last fifth of every {part}"),
@@ -139,6 +150,21 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         families=decision.families,
         assumptions=(ONE_CLOCK,) if any(one.commanded for one in series) else (),
     )
+
+
+def _rivals(one: Trial, best: Trial, groups: Sequence[Sequence[str]]) -> bool:
+    """Whether the records do not tell a trial from the best one: by the information criterion or by the evidence."""
+    if len(one.added) == len(best.added) and one.bic() - best.bic() < RIVALS:
+        return True
+    names, own = ({t.element(label).name for label in t.added} for t in (one, best))
+    return names != own and any(names ^ own <= set(group) for group in groups)
+
+
+def _delay_told(nominal: Model, fit: Fit, elements: Sequence[str]) -> tuple[str, ...]:
+    """The sentence about a delay that the nominal model does not have, where no hypothesis about it was chosen."""
+    if INPUT_DELAY in nominal.parameters or INPUT_DELAY in elements or INPUT_DELAY not in fit.names:
+        return ()
+    return unstated_delay(fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY])
 
 
 def _indistinguishable(model: Model, decision: Decision) -> tuple[tuple[str, ...], ...]:

@@ -19,9 +19,11 @@ from rhythmid.diagnose.answer.varied_motion import motion_varying
 from rhythmid.diagnose.answer.wording import NOT_LOCATED, freed_value, listed, recalibrated, summary_of
 from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.effort.found_delay import delay_told, found_delay
 from rhythmid.diagnose.effort.run import EffortResult
 from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.elements.places import SENTENCES
+from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import variation_of
 from rhythmid.record.separate_zeros import separate_zeros_notes
 
@@ -37,7 +39,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     sizes = scales_of(result.search.balance, chosen.fit.model)
     missing = without_untold(missing, chosen.fit.model, sizes)
     before, after = (
-        FitQuality(one.fit.error / size, _error(result, one) / size) for one in (nominal, chosen)
+        FitQuality(one.fit.error / size, result.errors[one.key] / size) for one in (nominal, chosen)
     )
     freed = freed_value(case.nominal, chosen.fit.model, result.selection.chosen)
     slots = list(dict.fromkeys(effect.slot for effect in missing))
@@ -69,21 +71,20 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         remainder=remainder,
         fit={"refitted_nominal": before, "augmented": after},
         parameters=effort_parameters(chosen),
-        delays=effort_delays(chosen),
+        delays=effort_delays(result.search.balance, chosen),
         next_experiment=_next_experiment(result),
         chosen=result.selection.chosen.elements,
         families=decision.families,
-        scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason),
+        scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason, 1),
         assumptions=(FIXED_SCALE, NO_SENSOR),
-        calibration=recalibrated(case.nominal, chosen.fit.model, chosen.std()),
+        calibration=(
+            *recalibrated(case.nominal, chosen.fit.model, chosen.std()),
+            *delay_told(result.search.balance, chosen, case.nominal),
+        ),
         excluded=tuple(Untried(name, why) for name, why in result.search.not_tried.items()),
         heldout=held,
         notes=(*notes, *separate_zeros_notes((*case.records[:1], *case.holdout))),
     )
-
-
-def _error(result: EffortResult, fitted: Fitted) -> float:
-    return result.errors[tuple(sorted(fitted.elements))]
 
 
 def _estimate(fitted: Fitted, name: str) -> Estimate:
@@ -98,9 +99,10 @@ def effort_parameters(fitted: Fitted) -> dict[str, Estimate]:
     return {name: _estimate(fitted, name) for name in fitted.model.parameters}
 
 
-def effort_delays(fitted: Fitted) -> dict:
+def effort_delays(balance: Balance, fitted: Fitted) -> dict:
     """The time offset between effort and motion: the only delay that the effort shows."""
-    late = {"value": fitted.fit.alignment, "std": float(fitted.fit.std[0]), "unit": "s"}
+    found = found_delay(balance, fitted)
+    late = {"value": found.value, "std": found.std, "unit": "s"}
     return {
         "input": {},
         "measurement": {},

@@ -9,10 +9,9 @@ from rhythmid.record.record import Record
 from rhythmid.report.findings import ElementWords
 from rhythmid.report.record_quality import RecordQuality, quality_of
 
-REFITTED = "refitted nominal model"
-CHANGED: dict[
-    Kind, str
-] = {  # name of the final model beside the nominal one, by the kind of the chosen hypothesis
+REFITTED_NOMINAL = "refitted nominal model"
+# name of the final model beside the nominal one, by the kind of the chosen hypothesis
+CHANGED: dict[Kind, str] = {
     "freed_value": "with the value set free",
     "delay": "with a longer delay",
     "free_map": "with a free law",
@@ -21,7 +20,7 @@ CHANGED: dict[
 
 def labels_of(kind: Kind) -> tuple[str, str]:
     """Labels of the nominal and the final model in figures."""
-    return REFITTED, CHANGED.get(kind, "with the added effect")
+    return REFITTED_NOMINAL, CHANGED.get(kind, "with the added effect")
 
 
 def listed(names: Sequence[str], most: int = 4) -> str:

@@ -27,9 +27,11 @@ from rhythmid.simulation.signal import spline, zero_order_hold
 Array = NDArray[np.float64]
 HIGHEST = 0.4  # of the sample rate
 LENGTH = 30.0  # periods of the dominant motion
-NONE = "none needed for these records; a larger and more varied excitation would exclude smaller effects"
+NONE_NEEDED = (
+    "none needed for these records; a larger and more varied excitation would exclude smaller effects"
+)
 MORE = "repeat the records with a larger and more varied excitation"
-NONE_FREE = (
+NONE_NEEDED_FREE = (
     "none needed for these records; releases from larger and smaller amplitudes would exclude smaller effects"
 )
 MORE_FREE = "repeat the records with releases from larger and smaller amplitudes"
@@ -39,29 +41,50 @@ RELEASES = (0.3, 3.0)
 
 @dataclass(frozen=True)
 class Proposal:
-    """An experiment of the menu, with the chi-squared by which it is expected to separate the two best rivals."""
+    """An experiment of the menu, with the chi-squared by which it is expected to separate the two best rivals.
+
+    `apart` is the rms difference of their outputs, in standard deviations of the noise.
+    """
 
     words: str
     chi2: float
+    apart: float
 
 
-def _menu(effort: float, frequency: float, length: float, highest: float) -> list[tuple[str, dict, float]]:
-    """(words, excitation, factor on the forcing) for a machine of this size, up to the frequency `highest` [Hz]."""
+def _menu(
+    size: float, unit: str, frequency: float, length: float, highest: float
+) -> list[tuple[str, dict, float]]:
+    """(words, excitation, factor on the forcing) for an input of this rms [unit], up to the frequency `highest` [Hz]."""
     top, above = min(7.0 * frequency, highest), min(21.0 * frequency, highest)
     found: list[tuple[str, dict, float]] = []
     for factor in (0.3, 1.0, 3.0):
-        amplitude = factor * effort
-        found.append((f"a chirp of {amplitude:.3g} from 0 to {top:.3g} Hz over {length:.3g} s",
+        amplitude = factor * size
+        told = f"{amplitude:.3g} {unit} ({'' if factor == 1.0 else f'{factor:g} times '}the rms of the recorded input)"
+        found.append((f"a chirp of {told} from 0 to {top:.3g} Hz over {length:.3g} s",
                       {"type": "chirp", "amplitude": amplitude, "band": [0.0, top], "sweep": length}, 1.0))  # fmt: skip
-        found.append((f"a step of bias force of {amplitude:.3g}, held for {length / 2:.3g} s and released",
+        found.append((f"a step of the input to {told}, held for {length / 2:.3g} s and released",
                       {"type": "profile", "points": [[0.0, amplitude], [length / 2, 0.0]], "length": length}, 1.0))  # fmt: skip
-    found.append((f"an odd multisine of {effort:.3g} rms up to {above:.3g} Hz",
-                  {"type": "multisine", "rms": effort, "period": length / 3, "periods": 3, "band": [frequency / 5, above]},
+    found.append((f"an odd multisine of {size:.3g} {unit} rms up to {above:.3g} Hz",
+                  {"type": "multisine", "rms": size, "period": length / 3, "periods": 3, "band": [frequency / 5, above]},
                   1.0))  # fmt: skip
     for scale in (0.3, 3.0):
         words = f"the cycle alone with the forcing scaled by {scale:g}"
         found.append((words, {"type": "silence", "length": length}, scale))
     return found
+
+
+def _of_the_input(series: Series, model: Model, sizes: Scales) -> tuple[float, str]:
+    """Usual size of the input and its unit: a force, a motor's signal, a reference or the motion of the base."""
+    fed = next(
+        (t.element.takes for t in model.terms if t.element.slot == "actuator" and t.element.takes), None
+    )
+    position = model.units.position
+    if series.kind == "force":
+        unit = fed or model.units.force
+    else:
+        unit = f"{position}/s^2" if series.kind == "base_acceleration" else position
+    own = float(np.std(series.drive))
+    return (sizes.effort if own == 0.0 or (series.kind == "force" and fed is None) else own), unit
 
 
 @dataclass(frozen=True)
@@ -107,11 +130,12 @@ def _releases(sizes: Scales, model: Model, longest: Series) -> list[_Experiment]
     return found
 
 
-def _played_menu(sizes: Scales, longest: Series, frequency: float) -> list[_Experiment]:
+def _played_menu(sizes: Scales, model: Model, longest: Series, frequency: float) -> list[_Experiment]:
     """Experiments that a driven machine can play."""
+    size, unit = _of_the_input(longest, model, sizes)
     length = min(LENGTH / frequency, longest.time[-1] - longest.time[0])
     found = []
-    for words, spec, factor in _menu(sizes.effort, frequency, length, HIGHEST / longest.period):
+    for words, spec, factor in _menu(size, unit, frequency, length, HIGHEST / longest.period):
         if factor != 1.0 and longest.forcing is None:
             continue
         found.append(_Experiment(words, _imagined(longest, build(spec), factor)))
@@ -143,7 +167,7 @@ def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, st
     menu = (
         _releases(sizes, a.model, longest)
         if sizes.idle
-        else _played_menu(sizes, longest, dominant_frequency(longest))
+        else _played_menu(sizes, a.model, longest, dominant_frequency(longest))
     )
     found: list[Proposal] = []
     for one in menu:
@@ -156,23 +180,27 @@ def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, st
         difference = difference - difference.mean()
         chi2 = float(difference @ difference) / max(variance, 1e-300)
         if math.isfinite(chi2):
-            found.append(Proposal(one.words, chi2))
+            found.append(Proposal(one.words, chi2, math.sqrt(chi2 / len(difference))))
     return sorted(found, key=lambda p: -p.chi2)
 
 
-def next_experiment(found: Search, rivals: Sequence[Trial], series: Sequence[Series], verdict: str) -> str:
-    """One sentence: what to record next, and which question that decides."""
+def next_experiment(found: Search, rivals: Sequence[Trial], series: Sequence[Series], needed: bool) -> str:
+    """One sentence: what to record next, and which question that decides.
+
+    `rivals` are the models that the records do not tell from the best one. `needed` says whether a question is open.
+    """
     best = found.best
-    none, more = (NONE_FREE, MORE_FREE) if scales(series, best.model).idle else (NONE, MORE)
-    others = [t for t in rivals if set(t.added) != set(best.added)]
-    if not others:
-        others = [t for t in found.trials if set(t.added) != set(best.added)]
-    if not others or (verdict == "consistent" and len(found.trials) < 2):
-        return more if verdict == "undecided" else none
-    menu = separation(best, others[0], series, found.noise.variance, found.fit.run.max_step)
+    none, more = (NONE_NEEDED_FREE, MORE_FREE) if scales(series, best.model).idle else (NONE_NEEDED, MORE)
+    if not needed:
+        return none
+    others = [t for t in rivals if t.key != best.key]
+    menu = separation(best, others[0], series, found.noise.variance, found.fit.run.max_step) if others else []
     if not menu:
         return more
     top = menu[0]
     versus = " + ".join(others[0].added) or "the nominal model"
     mine = " + ".join(best.added) or "the nominal model"
-    return f"{top.words}: expected to separate {mine} from {versus} by chi2 = {top.chi2:.3g}"
+    return (
+        f"{top.words}: expected to separate {mine} from {versus}, whose outputs would then differ by "
+        f"{top.apart:.2g} standard deviations of the noise (rms)"
+    )

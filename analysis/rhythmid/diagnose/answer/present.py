@@ -19,7 +19,6 @@ from rhythmid.diagnose.answer.described import (
 )
 from rhythmid.diagnose.answer.present_effort import effort_findings
 from rhythmid.diagnose.answer.result import Diagnosis
-from rhythmid.diagnose.baseline import causal
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.diagnosis import Answer
 from rhythmid.diagnose.free_run import FreeRunResult
@@ -27,6 +26,7 @@ from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import LEVEL, Search
 from rhythmid.elements.element import Element
 from rhythmid.errors import InputError
+from rhythmid.identify.admissible import admissible
 from rhythmid.identify.joint_covariance import JointCovariance
 from rhythmid.identify.motion_band import bandwidth
 from rhythmid.identify.output_error import Fit, noise_of
@@ -110,9 +110,9 @@ def findings(
         runs += free_runs(result.unseen_nominal, after, unseen, repaired, labels, heldout=True)
     models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": found.nominal.model.to_yaml()}
     if added:
-        models["Augmented model"] = causal(found.fit.model).to_yaml()
+        models["Augmented model"] = admissible(found.fit.model, nominal).model.to_yaml()
     count = max(len(found.rounds[0].scores), 1)
-    repeats = noise_from_repeats(list(found.fit.run.series))
+    repeats = noise_from_repeats(found.fit.run.series)
     return Findings(
         result=diagnosis.to_dict(),
         source=f"{name} against {listed([r.name for r in records])}",

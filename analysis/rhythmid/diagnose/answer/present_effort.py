@@ -18,6 +18,7 @@ from rhythmid.diagnose.answer.described import (
 )
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.effort.found_delay import with_found_delay
 from rhythmid.diagnose.effort.remainder import remainder_of
 from rhythmid.diagnose.effort.run import EffortResult
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -51,7 +52,7 @@ def effort_findings(
         runs += effort_runs(result.heldout, before, final, size, labels, heldout=True)
     models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": before.model.to_yaml()}
     if changed:
-        models["Augmented model"] = after.model.to_yaml()
+        models["Augmented model"] = with_found_delay(result.search.balance, after, nominal).to_yaml()
     elements = [term.element for term in nominal.terms]
     elements += [term.element for one in result.search.hypotheses for term in one.fit.model.terms]
     unit = _unit(records, nominal)
@@ -71,7 +72,7 @@ def effort_findings(
         words=words_of(elements),
         command=command,
         models=models,
-        refitted_delays=effort_delays(before),
+        refitted_delays=effort_delays(result.search.balance, before),
         functions=_functions(result, nominal, unit) if changed else (),
         at_bound=tuple(n for n, at in zip(after.fit.names, after.fit.at_limit[1:], strict=True) if at),
         hints=hints_of(diagnosis.indistinguishable, elements),

@@ -6,16 +6,15 @@ from dataclasses import asdict
 from rich.console import Console
 from rich.markup import escape
 
-from rhythmid.diagnose.answer.result import Diagnosis, Explanation, Remainder, Scored
+from rhythmid.diagnose.answer.result import Diagnosis, Explanation, Scored
 from rhythmid.diagnose.rejections import Rejection
 from rhythmid.report.hypotheses import grouped, interchangeable, most_weighed
-from rhythmid.report.quantity import NONE, number
+from rhythmid.report.quantity import NONE, RARE, averaged_words, remaining_error, written_percent
 from rhythmid.report.terminal_table import print_estimates, print_table
 
 HYPOTHESES_SHOWN = 6
 REJECTIONS_SHOWN = 5
 NOMINAL = "nominal model"
-LEAST_PROBABILITY = 1e-3  # probabilities below this, or within it of 1, are printed as a bound only
 
 
 def show(found: Diagnosis, console: Console) -> None:
@@ -25,7 +24,7 @@ def show(found: Diagnosis, console: Console) -> None:
     lines.told(verdict, found.summary)
     lines.said("where", found.location.where)
     for effect in found.missing:
-        sizes = f"{_percent(effect.share)} of the mismatch"
+        sizes = f"{written_percent(effect.share)} of the mismatch"
         if found.verdict == "missing_physics":  # with other verdicts the answer does not state the name
             sizes = f"probability {_probability(effect.probability)}, {sizes}"
         lines.told(effect.element, f"{effect.equation}   ({sizes})")
@@ -35,7 +34,9 @@ def show(found: Diagnosis, console: Console) -> None:
         }
         print_estimates(console, "", told, "parameter")
     for family in found.families if found.verdict == "undecided" else ():
-        sizes = f"probability {_probability(family.probability)}, {_percent(family.share)} of the mismatch"
+        sizes = (
+            f"probability {_probability(family.probability)}, {written_percent(family.share)} of the mismatch"
+        )
         lines.said(f"some form of {family.family}", f"{sizes}: {', '.join(family.laws)}")
     if len(found.missing) > 1 and found.verdict == "missing_physics":
         lines.said("joint probability of these names", _probability(found.joint_probability))
@@ -43,13 +44,14 @@ def show(found: Diagnosis, console: Console) -> None:
         lines.said("indistinguishable here", ", ".join(group))
     if len(found.hypotheses) > 1:
         _print_hypotheses(found, console)
-    lines.said("left", remainder_words(found.remainder))
+    lines.said("left", remainder_words(found))
     lines.said("scored", scoring_words(found.scoring))
     for name, fit in found.fit.items():
         if name == "augmented" and fit == found.refitted_nominal:
             continue  # the same model as the refitted nominal one
         held = NONE if fit.heldout_nrmse is None else f"{fit.heldout_nrmse:.5f}"
-        lines.said(name.replace("_", " "), f"NRMSE {fit.train_nrmse:.5f} on fitted data, {held} held out")
+        of = averaged_words(found.scoring.averaged)
+        lines.said(name.replace("_", " "), f"NRMSE{of} {fit.train_nrmse:.5f} on fitted data, {held} held out")
     for label, group in (
         ("assumption", found.assumptions),
         ("calibration", found.calibration),
@@ -88,10 +90,9 @@ def _print_hypotheses(found: Diagnosis, console: Console) -> None:
     rows = []
     for one in shown:
         behind = "best" if one.score_difference == 0.0 else _worse(one.score_difference, one.standard_error)
-        held = NONE if one.heldout_nrmse is None else f"{number(100.0 * one.heldout_nrmse, 3)} %"
         weight = f"{one.probability:.2f}" if len(one.elements) <= weighed else NONE
         name = (" + ".join(one.elements) or NOMINAL) + (" (chosen)" if _is_chosen(found, one) else "")
-        rows.append((name, one.kind.replace("_", " "), behind, weight, held))
+        rows.append((name, one.kind.replace("_", " "), behind, weight, written_percent(one.heldout_nrmse)))
     print_table(
         console,
         f"the {best} best of {len(found.hypotheses)} hypotheses{', and the chosen one' if len(shown) > best else ''}, "
@@ -107,11 +108,16 @@ def _is_chosen(found: Diagnosis, one: Explanation) -> bool:
     return sorted(one.elements) == sorted(found.chosen)
 
 
-def remainder_words(left: Remainder) -> str:
-    """The remainder that the named effects leave, in words."""
+def remainder_words(found: Diagnosis) -> str:
+    """The remainder in words: as a share of the mismatch; where nothing is missing there is no mismatch, and it is told by the error."""
+    left = found.remainder
     if not left.significant:
         return "nothing that any free function predicts better than chance"
-    return f"{_percent(left.share)} of the mismatch, which depends on {left.goes_with}"
+    if found.verdict == "consistent":
+        fit = found.refitted_nominal
+        error = fit.train_nrmse if fit.heldout_nrmse is None else fit.heldout_nrmse
+        return f"{remaining_error(error, found.scoring.kind)}, part of which depends on {left.goes_with}"
+    return f"{written_percent(left.share)} of the mismatch, which depends on {left.goes_with}"
 
 
 def scoring_words(scored: Scored) -> str:
@@ -162,12 +168,6 @@ def _worse(difference: float, error: float) -> str:
 
 def _probability(value: float) -> str:
     """A probability; close to 0 or 1 only a bound is given, because evidence never reaches either."""
-    if value < LEAST_PROBABILITY:
-        return f"< {100.0 * LEAST_PROBABILITY:g} %"
-    return (
-        f"> {100.0 * (1.0 - LEAST_PROBABILITY):g} %" if value > 1.0 - LEAST_PROBABILITY else _percent(value)
-    )
-
-
-def _percent(share: float) -> str:
-    return f"{number(100.0 * share, 3)} %"
+    if value < RARE:
+        return f"< {100.0 * RARE:g} %"
+    return f"> {100.0 * (1.0 - RARE):g} %" if value > 1.0 - RARE else written_percent(value)

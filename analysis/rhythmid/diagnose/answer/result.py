@@ -4,7 +4,7 @@ The types define the contract: `python -m rhythmid.diagnose.answer.result` print
 """
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from pydantic import TypeAdapter
@@ -119,11 +119,16 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Scored:
-    """How records were scored: in free run, in windows or by effort; the bandwidth [Hz] of effort scoring; the reason."""
+    """How records were scored: in free run, in windows or by effort; the bandwidth [Hz] of effort scoring; the reason.
+
+    `averaged` successive samples of the motion count as one, their mean. All errors refer to these means, in which the noise is
+    smaller than in single samples.
+    """
 
     kind: ScoringKind
     bandwidth: float | None
     reason: str
+    averaged: int
 
 
 @dataclass(frozen=True)
@@ -167,7 +172,7 @@ class Diagnosis:
     calibration: tuple[str, ...] = ()
     excluded: tuple[Untried, ...] = ()
     heldout: str = ""
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
     chosen: tuple[str, ...] = ()
     families: tuple[MissingFamily, ...] = ()
 

@@ -13,7 +13,8 @@ from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
-from rhythmid.report.quantity import in_words, number, rounded, with_written_unit
+from rhythmid.report.quantity import in_words, number, with_std, with_written_unit
+from rhythmid.simulation.transport import INPUT_DELAY
 
 NOT_LOCATED = "not located"
 
@@ -95,12 +96,13 @@ def summary_of(
     if decision.verdict == "consistent":
         said = "Nothing of practical size is missing: with its parameters refitted, the nominal model explains the records"
         left = decision.unexplained
-        if left.significant:
-            return f"{said} but for a small remainder that depends on {left.goes_with}."
-        if noise_known:
+        if noise_known and not left.significant:
             return f"{said} down to the noise."
         error = plain.train_nrmse if plain.heldout_nrmse is None else plain.heldout_nrmse
-        return f"{said} but for {100.0 * error:.2g} % of the {whole}, in which no test finds a cause."
+        small = f"{number(100.0 * error, 2)} % of the {whole}"
+        if left.significant:
+            return f"{said} but for {small}, part of which depends on {left.goes_with}."
+        return f"{said} but for {small}, in which no test finds a cause."
     if decision.verdict == "missing_physics":
         said = f"The model lacks {names}."
         if decision.equivalent:
@@ -196,7 +198,16 @@ def recalibrated(nominal: Model, fitted: Model, stds: Mapping[str, float]) -> tu
         least = max(CONTRADICTS * std, CONTRADICTS_LEAST * abs(value.value))
         if math.isfinite(std) and abs(new - value.value) > least:
             said.append(
-                f"{name}: {value.value:.6g} in the nominal model, {with_written_unit(f'{rounded(new, std)} ± {std:.2g}', value.unit)} in the "
+                f"{name}: {value.value:.6g} in the nominal model, {with_written_unit(with_std(new, std), value.unit)} in the "
                 "records"
             )
     return tuple(said)
+
+
+def unstated_delay(delay: float, std: float | None) -> tuple[str, ...]:
+    """A delay [s] that the records show and the nominal model does not have, as a sentence; none where noise may explain it."""
+    if std is None or not math.isfinite(std) or delay <= CONTRADICTS * std:
+        return ()
+    return (
+        f"{INPUT_DELAY}: none in the nominal model, {with_std(1e3 * delay, 1e3 * std)} ms in the records",
+    )

@@ -14,6 +14,7 @@ from rhythmid.diagnose.evidence import Linearised
 from rhythmid.diagnose.static_law import INSTANTS, SAME
 from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.least_squares import column_norms
 from rhythmid.model import Model
 from rhythmid.simulation.effect import Path, effect_along
 
@@ -55,7 +56,6 @@ def changes_with_time(element: Element, values: dict[str, float], model: Model) 
 
 def _beyond(effect: Array, columns: Array) -> float:
     """Mean square of an effect (n,) after projecting columns (n, p) out of it."""
-    norms = np.linalg.norm(columns, axis=0)
-    norms[norms == 0.0] = 1.0
+    norms = column_norms(columns)
     scaled = columns / norms
     return float(np.mean((effect - scaled @ np.linalg.lstsq(scaled, effect, rcond=1e-9)[0]) ** 2))

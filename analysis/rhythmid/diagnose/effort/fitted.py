@@ -2,16 +2,30 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rhythmid.diagnose.evidence import Linearised
+from rhythmid.diagnose.constants import UNNAMED_EFFORT
+from rhythmid.diagnose.evidence import Linearised, odds_of_rests
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.identify.drive import controlled
-from rhythmid.identify.inverse_dynamics.estimate import EffortFit
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.estimate import EffortFit, size_of
 from rhythmid.model import Model
 from rhythmid.simulation.transport import INPUT_DELAY
 from rhythmid.value import Prior
+
+Array = NDArray[np.float64]
+
+
+def odds_at_rest(fit: EffortFit, balance: Balance) -> Array:
+    """Log odds (r,) of the rests of a balance under a fitted model.
+
+    What models of real machines leave of the effort does not count against one.
+    """
+    return odds_of_rests(balance.rests.excess(fit.model), max(fit.scale, UNNAMED_EFFORT * size_of(balance)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,13 +44,20 @@ class Fitted:
     shape: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, elements: tuple[str, ...], kind: Kind, fit: EffortFit, priors: dict[str, Prior]) -> "Fitted":
-        """The hypothesis of a fit; a parameter that ends at a bound counts as fixed there."""
+    def of(
+        cls, elements: tuple[str, ...], kind: Kind, fit: EffortFit, priors: dict[str, Prior], balance: Balance
+    ) -> "Fitted":
+        """The hypothesis of a fit to a balance; a parameter that ends at a bound counts as fixed there."""
         inside = ~fit.at_limit
         linearised = Linearised(
-            fit.residual, fit.jacobian[:, inside], fit.precision[inside], fit.departure[inside]
-        )
+            fit.residual, fit.jacobian[:, inside], fit.precision[inside], fit.departure[inside], odds_at_rest(fit, balance)
+        )  # fmt: skip
         return cls(elements, kind, fit, priors, linearised)
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """The elements in alphabetical order, equal for equal structures."""
+        return tuple(sorted(self.elements))
 
     @property
     def model(self) -> Model:
@@ -50,17 +71,12 @@ class Fitted:
         late = max(value.value + self.fit.alignment, value.bounds[0])
         return model.with_parameters({name: replace(value, value=late)})
 
-    @property
-    def size(self) -> int:
-        """Number of parameters."""
-        return len(self.fit.names)
-
     def claimed(self, prediction: Prediction, nrmse: float | None = None) -> Hypothesis:
         """The hypothesis with its prediction, and its error on held-out data relative to the effort's variation."""
         model = self.fit.model
         values = {name: model.value(name) for name in self.fit.names}
         return Hypothesis.of(
-            model, self.elements, self.kind, self.size, prediction, nrmse, self.shape, values
+            model, self.elements, self.kind, len(values), prediction, nrmse, self.shape, values
         )
 
     def std(self) -> dict[str, float]:
@@ -79,4 +95,4 @@ def kind_of(elements: Sequence[str], model: Model) -> Kind:
 
 def worst(*shapes: Mapping[str, float]) -> dict[str, float]:
     """The smallest value of each statistic."""
-    return {name: min(one[name] for one in shapes if name in one) for name in set().union(*shapes)}
+    return {name: min(one[name] for one in shapes if name in one) for name in dict.fromkeys(chain(*shapes))}

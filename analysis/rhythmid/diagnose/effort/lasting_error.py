@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 PAST = 8  # past errors that predict the next one: two periods of the filter's cut-off, at 2.5 rows a period and more
-FOLDS = 2  # halves of each record; each is predicted with the coefficients of the other
-ROWS = 4 * PAST  # minimum rows of a record
+HALVES = 2  # halves of each record; each is predicted with the coefficients of the other
+LEAST_ROWS = 4 * PAST  # minimum rows of a record
 
 
 def lasting_share(error: Array, record: NDArray[np.int64], memory: int) -> float:
@@ -30,18 +30,18 @@ def lasting_share(error: Array, record: NDArray[np.int64], memory: int) -> float
     past, now, fold = [], [], []
     for number in np.unique(record):
         one = error[record == number]
-        if len(one) < ROWS + memory:
+        if len(one) < LEAST_ROWS + memory:
             continue
         windows = np.lib.stride_tricks.sliding_window_view(one[:-memory], PAST)
         later = one[PAST + memory - 1 :]
         past.append(windows)
         now.append(later)
-        fold.append(np.arange(len(later)) * FOLDS // len(later))
+        fold.append(np.arange(len(later)) * HALVES // len(later))
     if not now:
         return 0.0
     x, y, of = np.vstack(past), np.concatenate(now), np.concatenate(fold)
     left = 0.0
-    for number in range(FOLDS):
+    for number in range(HALVES):
         out = of == number
         coefficients = np.linalg.lstsq(x[~out], y[~out], rcond=None)[0]
         left += float(np.sum((y[out] - x[out] @ coefficients) ** 2))

@@ -73,7 +73,9 @@ def _with_map(balance: Balance, fitted: Fitted, ridge: float, free: Map, columns
             -scaling * np.linalg.lstsq(normal * np.outer(scaling, scaling), scaling * slope, rcond=1e-12)[0]
         )
         residual, departure = residual + jacobian @ step, departure + step
-    return Mapped(free, Linearised(residual, jacobian, precision, departure))
+    return Mapped(
+        free, Linearised(residual, jacobian, precision, departure, np.full_like(base.rests, np.nan))
+    )
 
 
 def residual_with_map(heldout: Balance, fitted: Fitted, found: Mapped) -> Array:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from rhythmid.diagnose.case import SEARCHED, Case
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT, UNNAMED_EFFORT
 from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
-from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.effort.fitted import Fitted, odds_at_rest
 from rhythmid.diagnose.effort.lasting_error import lasting_share
 from rhythmid.diagnose.effort.reference import (
     HISTORY,
@@ -32,9 +33,11 @@ from rhythmid.diagnose.evidence import (
     detectable,
     prediction,
     time_of_best,
+    with_trusted_rests,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
-from rhythmid.diagnose.model_uncertainty import covariance_between
+from rhythmid.diagnose.model_uncertainty import covariance_between, std_among
+from rhythmid.diagnose.probability import weights_of
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.size_error import size_errors
 from rhythmid.diagnose.verdict import Decision, decide
@@ -47,6 +50,7 @@ from rhythmid.identify.inverse_dynamics.free_map import FreeMap
 from rhythmid.identify.robust_covariance import root_weights, weighted, with_robust_std
 
 Array = NDArray[np.float64]
+K = TypeVar("K")
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,17 +95,22 @@ class _Rows:
         if mapped is None:
             fit = fitted.fit
             other = self.heldout.predicted(fit.model, fit.alignment) - self.heldout.measured
+            rests = odds_at_rest(fit, self.heldout)
         else:
             other = residual_with_map(self.heldout, fitted, mapped)
+            rests = np.full(len(self.heldout.rests.found), np.nan)
         residual = np.concatenate([seen.residual, other])
         jacobian = np.vstack([seen.jacobian, np.zeros((len(other), seen.jacobian.shape[1]))])
-        return cross_validate(Linearised(residual, jacobian, seen.precision, seen.departure), self.blocks)
+        rests = np.concatenate([seen.rests, rests])
+        return cross_validate(
+            Linearised(residual, jacobian, seen.precision, seen.departure, rests), self.blocks
+        )
 
     @property
     def judged(self) -> NDArray[np.bool_]:
         """Rows of held-out records; without any, all rows, each predicted by the fit that did not see it."""
-        held = self.blocks.fold[self.blocks.block] < 0
-        return held if held.any() else ~held
+        seen = self.blocks.seen_rows
+        return seen if seen.all() else ~seen
 
 
 def _rows(case: Case, found: EffortSearch, heldout: Balance | None) -> _Rows:
@@ -160,36 +169,39 @@ def effort_run(
         mapped[left[0].quantity] = rows.predicted(found.chosen, coupled)
     time = time_of_best([*predicted.values(), *mapped.values()], rows.record)
 
-    def made(one: CrossValidated) -> Prediction:
-        return prediction(one, rows.blocks, time)
+    def made(found: Mapping[K, CrossValidated]) -> dict[K, Prediction]:
+        each = with_trusted_rests([prediction(one, rows.blocks, time) for one in found.values()], rows.blocks)
+        return dict(zip(found, each, strict=True))
 
+    weighed = made(ruled_out) | made(predicted)
     errors = {
         tuple(sorted(elements)): float(np.sqrt(np.mean(one.error[rows.judged] ** 2)))
         for elements, one in (ruled_out | predicted).items()
     }
 
-    def claimed(one: Fitted, errors_of: CrossValidated) -> Hypothesis:
-        return one.claimed(made(errors_of), errors[tuple(sorted(one.elements))] / size)
+    def claimed(one: Fitted) -> Hypothesis:
+        return one.claimed(weighed[one.elements], errors[one.key] / size)
 
-    maps = {quantity: made(one) for quantity, one in mapped.items()}
     contest = Contest(
-        tuple(claimed(one, predicted[one.elements]) for one in found.hypotheses),
-        maps,
+        tuple(claimed(one) for one in found.hypotheses),
+        made(mapped),
         places * found.candidates,
         size,
         PRACTICAL_EFFORT,
         UNNAMED_EFFORT,
-        tuple(claimed(one, ruled_out[one.elements]) for one in found.ruled_out),
+        tuple(claimed(one) for one in found.ruled_out),
         cut_short=found.cut_short,
     )
     selection = select(contest)
-    chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
+    chosen = next(one for one in found.hypotheses if one.key == selection.chosen.key)
     if places == 1:  # with several joints the error of one may be caused by another
         lasting = lasting_share(predicted[chosen.elements].error, rows.record, GAP)
         contest = replace(contest, structured_after=lasting)
     least = detectable(predicted[chosen.elements].error, time) / size
     robust = replace(chosen, fit=with_robust_std(chosen.fit, found.balance.record))
-    errors_of_sizes = size_errors(chosen.fit.model, chosen.elements, robust.std())
+    weights = weights_of(contest, selection)
+    among = std_among(robust.std(), selection.chosen, contest.hypotheses, weights)
+    errors_of_sizes = size_errors(chosen.fit.model, chosen.elements, among)
     return EffortResult(
         applicability,
         found,

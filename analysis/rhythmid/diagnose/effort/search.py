@@ -18,7 +18,6 @@ from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.effort.beyond_gain import beyond_gain, recorded_efforts
 from rhythmid.diagnose.effort.beyond_motion import beyond_motion
 from rhythmid.diagnose.effort.candidate import (
-    INPUT_DELAY,
     Screened,
     Start,
     extended,
@@ -33,7 +32,7 @@ from rhythmid.diagnose.effort.kin import at_values_of, contained, kin, shortlist
 from rhythmid.diagnose.effort.reference import Mapped, reference_of
 from rhythmid.diagnose.effort.scales import scales_at, scales_of
 from rhythmid.diagnose.evidence import Blocks, predict
-from rhythmid.diagnose.hypothesis import Hypothesis, special_case
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, special_case
 from rhythmid.diagnose.rejections import AT_END, SHAPES, Claim, keeps_shape, rejections_of, replaces
 from rhythmid.diagnose.shape import within_bounds
 from rhythmid.elements.catalogue import Catalogue
@@ -49,6 +48,7 @@ from rhythmid.identify.inverse_dynamics.estimate import (
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
+from rhythmid.simulation.transport import INPUT_DELAY
 from rhythmid.value import Prior
 
 Array = NDArray[np.float64]
@@ -107,7 +107,7 @@ def search_effort(
     _, jacobian = linearise(balance, model, names, 0.0)
     priors = priors_of(balance, model, names, jacobian[:, 1:])
     with without_deadline():  # the reference for all comparisons
-        nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors)
+        nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors, balance)
     blocks = Blocks.of(balance.record, GAP)
     reference = reference_of(balance, nominal, blocks)
     search = _Search(
@@ -124,7 +124,7 @@ def search_effort(
         if better is None:
             break
         chosen = better
-    made = predict([one.linearised for one in search.found], search.blocks, balance.record)
+    made = search.predicted(search.found)
     best = search.found[max(range(len(made)), key=lambda index: made[index].score)]
     for one in (chosen, best) if best is not chosen else (chosen,):
         search.reduce(one)
@@ -153,8 +153,12 @@ class _Search:
     @property
     def set_aside(self) -> tuple[Fitted, ...]:
         """Hypotheses that were ruled out, one of each structure, unless another fit of that structure was kept."""
-        kept = {tuple(sorted(one.elements)): one for one in self.ruled_out if not self._known(one)}
+        kept = {one.key: one for one in self.ruled_out if not self._known(one)}
         return tuple(kept.values())
+
+    def predicted(self, hypotheses: Sequence[Fitted | Mapped]) -> list[Prediction]:
+        """Predictions of these hypotheses, or of free maps, on the same rows."""
+        return predict([one.linearised for one in hypotheses], self.blocks, self.balance.record)
 
     def cut_off(self, parent: Fitted) -> dict[str, str]:
         """What is not tried after the budget is spent: all candidates, or further effects beside those of the parent."""
@@ -187,10 +191,7 @@ class _Search:
             return None
         new = self._nearer(new)
         self.found.extend(new)
-        fits = [one.linearised for one in (*new, parent, self.nominal)]
-        *others, before, start, free = predict(
-            [*fits, self.reference.linearised], self.blocks, self.balance.record
-        )
+        *others, before, start, free = self.predicted([*new, parent, self.nominal, self.reference])
         order = sorted(range(len(new)), key=lambda index: -others[index].score)
         best = order[0]
         claimed = [one.claimed(prediction) for one, prediction in zip(new, others)]
@@ -213,9 +214,7 @@ class _Search:
 
         A simpler law may have ended in another minimum that fits as well but predicts worse.
         """
-        scores = [
-            one.score for one in predict([one.linearised for one in new], self.blocks, self.balance.record)
-        ]
+        scores = [one.score for one in self.predicted(new)]
         best = new[max(range(len(new)), key=scores.__getitem__)]
         found = list(new)
         for place, plain in enumerate(new):
@@ -224,9 +223,7 @@ class _Search:
                 aligned = self._aligned(plain.elements)
                 fit = self._fit(plain.elements, model, plain.priors, aligned, best.fit.alignment)
                 made = replace(fit, shape=worst(plain.shape, fit.shape))
-                *_, again = predict(
-                    [one.linearised for one in (*new, made)], self.blocks, self.balance.record
-                )
+                again = self.predicted([*new, made])[-1]
                 found[place] = made if again.score > scores[place] else plain
         return found
 
@@ -385,7 +382,7 @@ class _Search:
         self, elements: tuple[str, ...], model: Model, priors: dict[str, Prior], aligned: Alignment, at: float
     ) -> Fitted:
         fit = fit_effort(self.balance, model, [n for n in model.free if n in priors], priors, aligned, at)
-        made = Fitted.of(elements, kind_of(elements, model), fit, priors)
+        made = Fitted.of(elements, kind_of(elements, model), fit, priors, self.balance)
         sizes = scales_of(self.balance, model)
         terms = [term for label in elements if (term := fit.model.term(label)) is not None]
         ends = [within_bounds(term, sizes) for term in terms]
@@ -397,4 +394,4 @@ class _Search:
         return late_start(self.balance, self.nominal.fit)[0]
 
     def _known(self, fitted: Fitted) -> bool:
-        return any(set(one.elements) == set(fitted.elements) for one in self.found)
+        return any(one.key == fitted.key for one in self.found)

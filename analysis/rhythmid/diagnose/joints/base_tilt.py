@@ -18,15 +18,17 @@ from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS, HOLDS, PRACTICAL_EFFORT
 from rhythmid.diagnose.joints.joint_case import PROMISING, JointResult
 from rhythmid.diagnose.joints.link_evidence import gain_of, parts_of, with_body_of
-from rhythmid.diagnose.joints.payload_place import ROUNDS, Rows, weighted_rows
+from rhythmid.diagnose.joints.payload_place import ROUNDS, in_units_of_noise
 from rhythmid.diagnose.rejections import decisive
+from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, fit_effort, variation_of
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
-from rhythmid.report.quantity import rounded
+from rhythmid.report.quantity import with_std
 
 Array = NDArray[np.float64]
+WeightedRows = tuple[Array, Array]  # residual (n,) and columns (n, 3) of a joint, in units of its noise
 # [rad] prior standard deviation of an angle that is not known at all: that of a uniform angle
 ANY = math.pi / math.sqrt(3.0)
 # [rad] standard deviation from which an angle is not determined: no tilt, of up to a right angle, would then contradict the file
@@ -95,9 +97,7 @@ class BaseTilt:
         """The tilt and what to write, as one clause."""
         angle = self.angle
         vector = ", ".join(f"{float(format(one, '.4g')):g}" for one in np.round(self.gravity, 3) + 0.0)
-        said = (
-            f"the base is tilted by {rounded(angle.value, angle.std)} ± {angle.std:.2g}° (gravity [{vector}])"
-        )
+        said = f"the base is tilted by {with_std(angle.value, angle.std)}° (gravity [{vector}])"
         said += f"; write  gravity: [{vector}]  under 'body:' in model.yaml"
         if self.open is None:
             return said
@@ -136,14 +136,14 @@ def likely_tilt(
     if body.base == FREE or size == 0.0 or not found:
         return None
     weights = weights_per_unit(balances)
-    rows = {
-        joint: _rows(one.result.search.balance, one.result.nominal.fit, weights[joint])
+    rows = [
+        _rows(one.result.search.balance, one.result.nominal.fit, weights[joint])
         for joint, one in found.items()
-    }
-    directions, undetermined = directions_of(list(rows.values()), body.gravity)
+    ]
+    directions, undetermined = directions_of(rows, body.gravity)
     if not len(directions):
         return None
-    if _gained(list(rows.values()), body.gravity, directions) < PROMISING:
+    if _gained(rows, body.gravity, directions) < PROMISING:
         return None
     price = max(decisive(one.result.contest.candidates) for one in found.values()) + decisive(1) * len(
         directions
@@ -179,19 +179,21 @@ def weights_per_unit(balances: JointBalances) -> dict[str, list[Array]]:
     return found
 
 
-def _rows(balance, fit: EffortFit, weight: Sequence[Array]) -> Rows:
+def _rows(
+    balance: Balance, fit: EffortFit, weight: Sequence[Array], noise: Array | None = None
+) -> WeightedRows:
+    """What a fitted path leaves of the effort, and the effort (n, 3) per unit of gravity, in units of the noise."""
     columns = balance.rows(weight, balance.later(fit.model, fit.alignment))
-    return Rows(fit.residual, columns, fit.jacobian, balance.record)
+    return in_units_of_noise(fit.residual, columns, fit.jacobian, balance.record, noise)
 
 
-def directions_of(rows: Sequence[Rows], given: Array) -> tuple[Array, Array | None]:
+def directions_of(rows: Sequence[WeightedRows], given: Array) -> tuple[Array, Array | None]:
     """The directions (k, 3) across gravity in which the efforts determine a tilt, and the one in which they do not, if there is one."""
     size = float(np.linalg.norm(given))
     _, _, axes = np.linalg.svd(given[None, :] / size)
     across = axes[1:]
     information = np.zeros((ANGLES, ANGLES))
-    for one in rows:
-        _, columns = weighted_rows(one)
+    for _, columns in rows:
         own = size * columns @ across.T
         information += own.T @ own
     values, turns = np.linalg.eigh(information)
@@ -201,12 +203,11 @@ def directions_of(rows: Sequence[Rows], given: Array) -> tuple[Array, Array | No
     return directions[known], missing[0] if len(missing) == 1 else None
 
 
-def _gained(rows: Sequence[Rows], given: Array, directions: Array) -> float:
+def _gained(rows: Sequence[WeightedRows], given: Array, directions: Array) -> float:
     """Gain of log likelihood of a small tilt beside the given paths, to first order."""
     size = float(np.linalg.norm(given))
     normal, slope = np.zeros((len(directions), len(directions))), np.zeros(len(directions))
-    for one in rows:
-        left, columns = weighted_rows(one)
+    for left, columns in rows:
         own = size * columns @ directions.T
         normal += own.T @ own
         slope += own.T @ left
@@ -232,7 +233,7 @@ def _options(one: JointResult, weight: Sequence[Array]) -> list[_Option]:
     noise, price = one.result.chosen.fit.residual, decisive(one.result.contest.candidates)
     made = []
     for part in parts_of(one):
-        left, columns = weighted_rows(_rows(one.result.search.balance, part.fit, weight), noise)
+        left, columns = _rows(one.result.search.balance, part.fit, weight, noise)
         triangle: Array = np.asarray(np.linalg.qr(np.column_stack([columns, left]), mode="r"))
         made.append(_Option(part.fit.model, triangle, price * len(part.elements)))
     return made
@@ -279,8 +280,8 @@ def _fitted(
         weighted = []
         for joint, one in found.items():
             balance = pulled(balances, joint, weights, gravity - given).balance(joint, one.late)
-            model = with_body_of(balances, joint, paths[joint])
-            weighted.append(weighted_rows(_rows(balance, fit_effort(balance, model), weights[joint])))
+            model = with_body_of(balances.models[joint], paths[joint])
+            weighted.append(_rows(balance, fit_effort(balance, model), weights[joint]))
         angles, covariance = _refined(weighted, given, directions, angles)
     return BaseTilt(given, directions, angles, covariance, None, 0.0)
 
@@ -297,7 +298,7 @@ def pulled(
 
 
 def _refined(
-    rows: Sequence[tuple[Array, Array]], given: Array, directions: Array, start: Array
+    rows: Sequence[WeightedRows], given: Array, directions: Array, start: Array
 ) -> tuple[Array, Array]:
     """Improved angles (k,) from a `start` (k,), and their covariance (k, k); `rows` are residuals and columns in units of the noise."""
     triangles = [np.linalg.qr(np.column_stack([columns, left]), mode="r") for left, columns in rows]

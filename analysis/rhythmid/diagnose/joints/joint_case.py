@@ -16,7 +16,7 @@ from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.rests import told
 from rhythmid.identify.joints.joint_motion import JointBalances
-from rhythmid.model import INERTIA, Model
+from rhythmid.model import INERTIA
 from rhythmid.progress import Tell
 from rhythmid.simulation.transport import INPUT_DELAY
 
@@ -106,13 +106,11 @@ def diagnose_joint(
         except InputError:
             other = None  # too little motion: it cannot be used for judging
     case = Case(model, (), (), joint_catalogue(catalogue), None, tell, budget)
-    found = effort_run(
-        case, _applicable(balance, model), MOST_EFFECTS, other, PROMISING, len(balances.models)
-    )
+    found = effort_run(case, _applicable(balance), MOST_EFFECTS, other, PROMISING, len(balances.models))
     return JointResult(joint, case, late, found, balances.rotors(joint))
 
 
-def _applicable(balance: Balance, model: Model) -> Applicability:
+def _applicable(balance: Balance) -> Applicability:
     chosen = balance.bandwidth
     reason = f"the effort of each joint is predicted, below {chosen.effort:.3g} Hz at this one"
     reason = "; ".join(filter(None, (reason, told(balance.stuck))))

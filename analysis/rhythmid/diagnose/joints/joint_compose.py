@@ -152,9 +152,7 @@ def _value(one: JointResult, answer: Diagnosis, label: str) -> Estimate:
 def _gain(one: JointResult) -> float:
     """Reduction of the error on data that no fit has seen, as a share of the joint's effort."""
     size = size_of(one.result.search.balance)
-    before, after = (
-        one.result.errors[tuple(sorted(f.elements))] for f in (one.result.nominal, one.result.chosen)
-    )
+    before, after = (one.result.errors[fitted.key] for fitted in (one.result.nominal, one.result.chosen))
     return (before - after) / size
 
 

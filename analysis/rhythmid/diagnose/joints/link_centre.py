@@ -6,7 +6,7 @@ With the shape of the inertia about the centre held, the force is known for any 
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.joints.joint_case import JointResult
 from rhythmid.diagnose.joints.link_evidence import own_path, weight_of_values, with_body_of
-from rhythmid.diagnose.joints.payload_place import BESIDE, ROUNDS, rows_of, weighted_rows
+from rhythmid.diagnose.joints.payload_place import AXES, BESIDE, ROUNDS, weighted_rows
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.joints.base_parameters import from_cholesky, to_cholesky
 from rhythmid.identify.joints.joint_motion import JointBalances
@@ -98,7 +98,7 @@ class Load:
         """The centre by axis."""
         return {
             axis: Estimate(float(place), float(std), "m")
-            for axis, place, std in zip("xyz", self.place, self._std[1:], strict=True)
+            for axis, place, std in zip(AXES, self.place, self._std[1:], strict=True)
         }
 
     @property
@@ -110,45 +110,30 @@ class Load:
         return Estimate(self.mass * far, float(np.sqrt(max(slope @ self.covariance @ slope, 0.0))), "kg*m")
 
 
-def centre_instead(
+def refitted_link(
     balances: JointBalances, records: Sequence[JointRecord], found: Mapping[str, JointResult], link: str, corrected: JointBalances,
+    centre_only: bool,
 ) -> Load:  # fmt: skip
-    """The centre of mass of a link that fits best, its mass and the inertia about the centre held, weighed against the balances `corrected` by
-    another value of this link."""
-    return _best(balances, records, found, link, corrected, _centre)
+    """Inertia of a link that fits best, weighed against the balances `corrected` by another value of this link.
 
+    With `centre_only` its mass and its inertia about the centre are held. Without, mass, centre and inertia are fitted together: what one joint
+    feels of a body that is attached to a link are its first moment and its inertia about the joint, so that its mass follows from the joints
+    above, whatever its inertia is.
 
-def load_instead(
-    balances: JointBalances, records: Sequence[JointRecord], found: Mapping[str, JointResult], link: str, corrected: JointBalances,
-) -> Load:  # fmt: skip
-    """Mass, centre of mass and inertia of a link that fit best together, weighed like `centre_instead`.
-
-    What one joint feels of a body that is attached to a link are its first moment and its inertia about the joint, so that its mass follows
-    from the joints above, whatever its inertia is.
+    An effect that was found at a joint, such as a gain of its effort, may only have stood for the link. So the link is fitted beside the given
+    paths, and beside the effects that were found where this has decisively more evidence.
     """
-    return _best(balances, records, found, link, corrected, fitted_body)
-
-
-Refined = Callable[[Sequence[tuple[Array, Array]], Principal, Array], tuple[Array, Array]]
-
-
-def _best(
-    balances: JointBalances, records: Sequence[JointRecord], found: Mapping[str, JointResult], link: str, corrected: JointBalances,
-    refined: Refined,
-) -> Load:  # fmt: skip
-    """An effect that was found at a joint, such as a gain of its effort, may only have stood for the link. So the link is fitted beside the
-    given paths, and beside the effects that were found where this has decisively more evidence."""
     given = {joint: balances.models[joint] for joint in found}
     effects = {joint: own_path(balances, one) for joint, one in found.items()}
     plain, richer = (
-        _fitted(balances, records, found, link, corrected, paths, refined) for paths in (given, effects)
+        _fitted(balances, records, found, link, corrected, paths, centre_only) for paths in (given, effects)
     )
     return richer if richer.weight > plain.weight + decisive(1) else plain
 
 
 def _fitted(
     balances: JointBalances, records: Sequence[JointRecord], found: Mapping[str, JointResult], link: str, corrected: JointBalances,
-    paths: Mapping[str, Model], refined: Refined,
+    paths: Mapping[str, Model], centre_only: bool,
 ) -> Load:  # fmt: skip
     machine = balances.machine
     own = machine.body.own(link)
@@ -156,18 +141,15 @@ def _fitted(
     ten, covariance, now = own.ten, np.zeros((4, 4)), balances
     for _ in range(ROUNDS):
         rows = [
-            weighted_rows(
-                rows_of(now, joint, with_body_of(now, joint, paths[joint]), found[joint].late, link)
-            )
+            weighted_rows(now, joint, with_body_of(now.models[joint], paths[joint]), found[joint].late, link)
             for joint in joints
         ]
-        ten, covariance = refined(rows, own, ten)
-        held = refined is _centre
-        made = machine.with_centre(link, ten[1:4] / ten[0]) if held else machine.with_load(link, ten)
+        ten, covariance = (_centre if centre_only else fitted_body)(rows, own, ten)
+        made = machine.with_centre(link, ten[1:4] / ten[0]) if centre_only else machine.with_load(link, ten)
         now = JointBalances.of(made, records, balances)
     hinge = machine.body.hinges.get(link)
     origin = np.zeros(3) if hinge is None else hinge.place
-    return Load(ten, covariance, own, origin, weight_of_values(found, corrected, now, joints))
+    return Load(ten, covariance, own, origin, weight_of_values(found, corrected, now, joints, link))
 
 
 def _centre(rows: Sequence[tuple[Array, Array]], own: Principal, start: Array) -> tuple[Array, Array]:

@@ -7,6 +7,9 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rhythmid.body.body import BODY
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS
@@ -23,19 +26,20 @@ from rhythmid.model import Model
 from rhythmid.simulation.transport import INPUT_DELAY
 from rhythmid.value import Prior
 
+Array = NDArray[np.float64]
+
 
 def own_path(balances: JointBalances, one: JointResult) -> Model:
     """The path of a joint with the effects found there, and with the values of the body and of its rotor as they are given."""
-    model = with_body_of(balances, one.joint, one.result.chosen.fit.model)
-    return replace(model, mass=balances.models[one.joint].mass)
+    nominal = balances.models[one.joint]
+    return replace(with_body_of(nominal, one.result.chosen.fit.model), mass=nominal.mass)
 
 
-def with_body_of(balances: JointBalances, joint: str, model: Model, kept: bool = False) -> Model:
-    """A path of a joint with the values of the body as they are given, or with its own `kept` and those that it lacks.
+def with_body_of(nominal: Model, model: Model, kept: bool = False) -> Model:
+    """A path of a joint with the values of the body as its `nominal` path has them, or with its own `kept` and those that it lacks.
 
     Its inertia is that which the balance has subtracted from what the body asks for; it stays free where it is.
     """
-    nominal = balances.models[joint]
     inertia = replace(nominal.mass, fixed=model.mass.fixed)
     given, own = nominal.term(BODY), model.term(BODY)
     if given is None or own is None:
@@ -112,31 +116,43 @@ def weight_of_joints(
 
 def _of_effects(one: JointResult) -> Fitted:
     """The hypothesis of a joint that predicts best among those that free no value of the body."""
-    return _best_without(one, f"{BODY}.")
-
-
-def _best_without(one: JointResult, begin: str) -> Fitted:
-    """The hypothesis of a joint that predicts best among those that free no value whose name has this beginning."""
     found = [
-        fit for fit in one.result.search.hypotheses if not any(e.startswith(begin) for e in fit.elements)
+        fit for fit in one.result.search.hypotheses if not any(e.startswith(f"{BODY}.") for e in fit.elements)
     ]
     score = {h.elements: h.prediction.score for h in one.result.contest.hypotheses}
     return max(found, key=lambda fit: score[fit.elements])
 
 
+def _of_own_link(one: JointResult, link: str, balances: JointBalances) -> list[Fitted]:
+    """The hypotheses of a joint that free one value of the link that it turns; none where this is the `link` itself."""
+    body = balances.machine.body
+    own = tuple(f"{BODY}.{name}." for name in body.links if name != link and body.joint_of(name) == one.joint)
+    return [
+        fit
+        for fit in one.result.search.hypotheses
+        if len(fit.elements) == 1 and fit.elements[0].startswith(own)
+    ]
+
+
 def weight_of_values(
-    found: Mapping[str, JointResult], before: JointBalances, after: JointBalances, joints: Collection[str],
+    found: Mapping[str, JointResult], before: JointBalances, after: JointBalances, joints: Collection[str], link: str | None = None,
 ) -> float:  # fmt: skip
-    """Log odds that these joints together give the values of the body `after` against those `before`, with the effects found at them."""
+    """Log odds that these joints together give the values of the body `after` against those `before`, with the effects found at them.
+
+    Where the values are those of one `link`, a joint that needs another value of the link that it turns, whichever of the two is right, has it:
+    what is left of its effort only until its own link is corrected is no evidence for the link that is carried.
+    """
     total = 0.0
     for joint in joints:
         one = found[joint]
-        hypotheses = [one.result.nominal, _of_effects(one)]
-        total += gain_of(
-            one,
-            hypotheses,
-            *((side.models[joint], side.balance(joint, one.late)) for side in (before, after)),
-        )
+        sides = [(side.models[joint], side.balance(joint, one.late)) for side in (before, after)]
+        plain = [one.result.nominal, _of_effects(one)]
+        own = [] if link is None else _of_own_link(one, link, before)
+        scores = _net_scores(one, [*plain, *own], sides) if own else None
+        if scores is not None and (scores.argmax(axis=1) >= len(plain)).all():
+            total += float(scores[1].max() - scores[0].max())
+        else:
+            total += gain_of(one, plain, *sides)
     return total
 
 
@@ -162,28 +178,30 @@ def gain_of(
     Each side has the best of these hypotheses, of which an effect costs what any addition has to gain in a search: a value of a link
     that needs another effect at a joint beside it explains less than one that needs none.
     """
-    fits = [_moved(fitted, *side).linearised for side in (before, after) for fitted in hypotheses]
+    scores = _net_scores(one, hypotheses, (before, after))
+    return 0.0 if scores is None else float(scores[1].max() - scores[0].max())
+
+
+def _net_scores(
+    one: JointResult, hypotheses: Sequence[Fitted], sides: Sequence[tuple[Model, Balance]]
+) -> Array | None:
+    """Log scores (sides, hypotheses) less the price of the effects; None where the sides do not have the same rows."""
+    fits = [_moved(fitted, *side).linearised for side in sides for fitted in hypotheses]
     if len({len(fit.residual) for fit in fits}) > 1:
-        return 0.0
+        return None
     price = decisive(one.result.contest.candidates)
     search = one.result.search
     scores = [each.score for each in predict(fits, search.blocks, search.balance.record)]
-    net = [
-        score - price * len(fitted.elements)
-        for score, fitted in zip(scores, [*hypotheses, *hypotheses], strict=True)
-    ]
-    return max(net[len(hypotheses) :]) - max(net[: len(hypotheses)])
+    prices = [price * len(fitted.elements) for fitted in hypotheses]
+    return np.reshape(scores, (len(sides), len(hypotheses))) - np.array(prices)
 
 
 def _moved(fitted: Fitted, nominal: Model, balance: Balance) -> Fitted:
     """A hypothesis about a joint, fitted again with other values of the body: those of a nominal path and its balance."""
-    body = nominal.term(BODY)
     model = fitted.fit.model
-    terms = tuple(body if body is not None and term.label == BODY else term for term in model.terms)
-    inertia = replace(nominal.mass, fixed=model.mass.fixed)
+    made = with_body_of(nominal, model)
     if not model.mass.fixed:
-        inertia = replace(inertia, value=max(model.mass.value, inertia.bounds[0]))
+        made = replace(made, mass=replace(made.mass, value=max(model.mass.value, made.mass.bounds[0])))
     names = [name for name in fitted.fit.names if name in model.parameters]
-    made = replace(model, mass=inertia, terms=terms)
     fit = fit_effort(balance, made, names, fitted.priors, alignment=fitted.fit.alignment)
-    return Fitted.of(fitted.elements, fitted.kind, fit, fitted.priors)
+    return Fitted.of(fitted.elements, fitted.kind, fit, fitted.priors, balance)

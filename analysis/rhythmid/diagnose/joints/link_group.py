@@ -18,7 +18,7 @@ from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.joints.joint_case import JointResult
 from rhythmid.diagnose.joints.link_evidence import own_path
-from rhythmid.diagnose.joints.payload_place import rows_of, weighted_rows
+from rhythmid.diagnose.joints.payload_place import weighted_rows
 from rhythmid.identify.joints.joint_motion import JointBalances
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ def _columns(balances: JointBalances, one: JointResult, links: Sequence[str]) ->
     made = []
     for link in links:
         own = balances.machine.body.own(link)
-        _, columns = weighted_rows(rows_of(balances, one.joint, model, one.late, link))
+        _, columns = weighted_rows(balances, one.joint, model, one.late, link)
         made.append(columns @ own.ten / own.mass)
     return np.column_stack(made)
 

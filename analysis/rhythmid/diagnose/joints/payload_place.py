@@ -6,15 +6,15 @@ its inertia (M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362). Mass and
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rhythmid.body.body import BODY
-from rhythmid.body.inertial_parameter import PAYLOAD
+from rhythmid.body.inertial_parameter import MASS, PAYLOAD
 from rhythmid.body.link_inertia import point_mass
+from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.joints.joint_case import JointResult
 from rhythmid.diagnose.joints.link_evidence import own_path, weight_of_values, with_body_of
 from rhythmid.diagnose.rejections import decisive
@@ -26,28 +26,9 @@ from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
 
 Array = NDArray[np.float64]
+AXES = ("x", "y", "z")
 BESIDE = 0.1  # [m] standard deviation of a payload's place about the end of its link: the size of a gripper or of a foot
 ROUNDS = 3  # alternating fits of the paths and of the payload; the payload converges in two
-
-
-@dataclass(frozen=True, eq=False)
-class PlacedPayload:
-    """Mass [kg] of a payload and its place (3,) [m] in the frame of its link, with standard deviations."""
-
-    mass: float
-    mass_std: float
-    place: Array
-    place_std: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """The data of one joint: residual (n,), columns (n, 10) of the link's inertia, columns (n, p) of the other parameters."""
-
-    residual: Array
-    columns: Array
-    beside: Array
-    record: NDArray[np.int64]
 
 
 def placed_payload(
@@ -56,8 +37,8 @@ def placed_payload(
     found: Mapping[str, JointResult],
     link: str,
     shown_at: str,
-) -> PlacedPayload:
-    """Mass and place of the payload of a link; `shown_at` is the joint whose search found it.
+) -> dict[str, Estimate]:
+    """Mass [kg] of the payload of a link, and its place "x", "y", "z" [m] in the frame of the link; `shown_at` is the joint whose search found it.
 
     All paths are refitted together with the payload. Effects and values that were found may only have stood for the payload. So the
     paths are the given ones; at the joint `shown_at` what was found, and at the others, too, where this has decisively more evidence.
@@ -85,7 +66,7 @@ def _fitted(
     shown_at: str,
     paths: Mapping[str, Model],
     start: float,
-) -> tuple[PlacedPayload, float]:
+) -> tuple[dict[str, Estimate], float]:
     """The payload fitted beside these paths from a `start` [kg], and the log odds that all joints give it."""
     machine, label = balances.machine, f"{BODY}.{link}.{PAYLOAD}"
     end = machine.body.ends[link]
@@ -98,54 +79,59 @@ def _fitted(
     for _ in range(ROUNDS):
         rows = []
         for joint in (one for one in found if f"{link}.{PAYLOAD}" in now.links(one)):
-            model = with_body_of(now, joint, paths[joint], kept=joint == shown_at)
+            model = with_body_of(now.models[joint], paths[joint], kept=joint == shown_at)
             held = model.with_parameters({label: now.models[joint].parameters[label]})
-            rows.append(rows_of(now, joint, held, found[joint].late, link))
+            rows.append(weighted_rows(now, joint, held, found[joint].late, link))
         value, std = _refined(rows, value, end)
         now = carried()
-    payload = PlacedPayload(float(value[0]), float(std[0]), value[1:], std[1:])
+    units = zip((MASS, *AXES), value, std, ("kg", "m", "m", "m"), strict=True)
+    payload = {name: Estimate(float(one), float(its), unit) for name, one, its, unit in units}
     return payload, weight_of_values(found, balances, now, list(found))
 
 
-def _refined(rows: Sequence[Rows], value: Array, end: Array) -> tuple[Array, Array]:
-    """Improved mass and place (4,) from a start `value`, and their standard deviations."""
-    weighted = [weighted_rows(one) for one in rows]
+def _refined(rows: Sequence[tuple[Array, Array]], value: Array, end: Array) -> tuple[Array, Array]:
+    """Improved mass and place (4,) from a start `value`, and their standard deviations; `rows` as `weighted_rows` gives them."""
     before = value[0] * point_mass(value[1:])
 
     def error(at: Array) -> Array:
         change = at[0] * point_mass(at[1:]) - before
-        return np.concatenate(
-            [*(left + columns @ change for left, columns in weighted), (at[1:] - end) / BESIDE]
-        )
+        return np.concatenate([*(left + columns @ change for left, columns in rows), (at[1:] - end) / BESIDE])
 
     low = np.array([0.0, *(3 * [-np.inf])])
     solved = least_squares(error, value, bounds=(low, np.inf), x_scale="jac")
     return solved.x, np.sqrt(np.diag(np.linalg.pinv(solved.jac.T @ solved.jac)))
 
 
-def rows_of(balances: JointBalances, joint: str, model: Model, late: float, link: str) -> Rows:
-    """The data of a joint with its path fitted, and the columns of a link."""
+def weighted_rows(
+    balances: JointBalances, joint: str, model: Model, late: float, link: str
+) -> tuple[Array, Array]:
+    """Residual (n,) of a joint with its path fitted, and columns (n, 10) of the inertia of a link, in units of the joint's noise.
+
+    The other parameters of the joint are projected out.
+    """
     body = balances.machine.body
     own = body.joints[joint].velocity
     balance = balances.balance(joint, late)
     fit = fit_effort(balance, model)
     made = [body.inertial_columns(link, b.pose, b.rate, b.acceleration)[:, own] for b in balances.bodies]
     columns = balance.rows(made, balance.later(fit.model, fit.alignment))
-    return Rows(fit.residual, columns, fit.jacobian, balance.record)
+    return in_units_of_noise(fit.residual, columns, fit.jacobian, balance.record)
 
 
-def weighted_rows(one: Rows, noise: Array | None = None) -> tuple[Array, Array]:
-    """Residual and columns of a joint in units of its noise, with the joint's other parameters projected out.
+def in_units_of_noise(
+    residual: Array, columns: Array, beside: Array, record: NDArray[np.int64], noise: Array | None = None
+) -> tuple[Array, Array]:
+    """A residual (n,) and columns (n, k) in units of the noise, with the columns `beside` (n, p) of other parameters projected out.
 
-    The `noise` (n,) is the residual itself unless that of a better model is given.
+    The `noise` (n,) is the residual itself unless that of a better model is given; `record` (n,) is the record of each row.
     """
-    noise = one.residual if noise is None else noise
+    noise = residual if noise is None else noise
     scale = scale_of(noise)
-    lasts = autocorrelation_time(noise, one.record)
+    lasts = autocorrelation_time(noise, record)
     root = np.sqrt(weights_of(noise, scale) / lasts) / scale
-    basis = orthonormal(one.beside * root[:, None])
+    basis = orthonormal(beside * root[:, None])
 
     def without(signal: Array) -> Array:
         return signal - basis @ (basis.T @ signal)
 
-    return without(root * one.residual), without(root[:, None] * one.columns)
+    return without(root * residual), without(root[:, None] * columns)

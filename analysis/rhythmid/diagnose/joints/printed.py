@@ -6,7 +6,7 @@ from rich.markup import escape
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.misfit import left_in_words
-from rhythmid.report.quantity import NONE, number, rounded
+from rhythmid.report.quantity import with_std, written_percent
 from rhythmid.report.terminal_table import print_table
 
 
@@ -17,15 +17,14 @@ def show_diagnosis(found: MachineDiagnosis, console: Console) -> None:
         what = one.of_link or one.element
         console.print(
             f"[bold]{escape(one.place)}: {escape(what)}[/]   {escape(one.equation)}   (probability {one.probability:.2f}, "
-            f"{number(100.0 * one.share, 3)} % of the joint's mismatch)"
+            f"{written_percent(one.share)} of the joint's mismatch)"
         )
         for name, value in one.parameters.items():
-            std = "" if value.std is None else f" ± {value.std:.2g}"
-            console.print(f"  {name}: {rounded(value.value, value.std)}{std} {escape(value.unit)}")
+            console.print(f"  {name}: {with_std(value.value, value.std)} {escape(value.unit)}")
     for joint, families in found.families.items():
         for one in families:
             console.print(
-                f"{escape(joint)}: some form of {one.family} (probability {one.probability:.2f}, {number(100.0 * one.share, 3)} % of the "
+                f"{escape(joint)}: some form of {one.family} (probability {one.probability:.2f}, {written_percent(one.share)} of the "
                 f"joint's mismatch): {', '.join(one.laws)}"
             )
     for group in found.indistinguishable:
@@ -33,7 +32,15 @@ def show_diagnosis(found: MachineDiagnosis, console: Console) -> None:
     rows = []
     for joint, one in found.joints.items():
         before, after = (one.fit[name].heldout_nrmse for name in ("refitted_nominal", "augmented"))
-        rows.append((joint, one.verdict.replace("_", " "), _share(before), _share(after), left_words(one)))
+        rows.append(
+            (
+                joint,
+                one.verdict.replace("_", " "),
+                written_percent(before),
+                written_percent(after),
+                left_words(one),
+            )
+        )
     title = "error of the effort on data that no fit has seen, as a share of it"
     print_table(console, title, ("joint", "verdict", "nominal", "augmented", "left"), rows)
     for joint, why in found.not_judged.items():
@@ -48,7 +55,3 @@ def left_words(one: Diagnosis) -> str:
     """The unexplained share of a joint's mismatch, in words; a dash where there is no mismatch."""
     left = one.remainder
     return left_in_words(one.verdict, left.share, left.significant, one.fit["augmented"].heldout_nrmse)
-
-
-def _share(error: float | None) -> str:
-    return NONE if error is None else f"{number(100.0 * error, 3)} %"

@@ -13,16 +13,14 @@ from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.joints.joint_case import JointResult
-from rhythmid.diagnose.joints.link_centre import NUMBERS, PLACES, Load, centre_instead, load_instead
+from rhythmid.diagnose.joints.link_centre import NUMBERS, PLACES, Load, refitted_link
 from rhythmid.diagnose.joints.link_evidence import shared_estimate
 from rhythmid.diagnose.joints.link_group import Together, masses_alike
-from rhythmid.diagnose.joints.payload_place import placed_payload
+from rhythmid.diagnose.joints.payload_place import AXES, placed_payload
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
-from rhythmid.report.quantity import rounded
-
-AXES = ("x", "y", "z")
+from rhythmid.report.quantity import with_std
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +79,7 @@ class WrongLink:
             ]
             if "x" in told:
                 places = ", ".join(f"{one:.3g}" for one in own.centre)
-                now = ", ".join(
-                    f"{rounded(one.value, one.std)} ± {one.std:.2g}" for one in (told[axis] for axis in AXES)
-                )
+                now = ", ".join(with_std(one.value, one.std) for one in (told[axis] for axis in AXES))
                 said.append(f"({places}) m in the nominal model, ({now}) m in the records")
             return f"{self.parameter}: {'; '.join(said)}"
         if self.together is not None:
@@ -91,7 +87,7 @@ class WrongLink:
             return f"mass of {links} together: {_change(self.together.given, self.together.mass)}"
         if kind not in self.told and MOMENT in self.told:
             moment = self.told[MOMENT]
-            return f"{link}.{MOMENT}: {rounded(moment.value, moment.std)} ± {moment.std:.2g} {moment.unit} in the records"
+            return f"{link}.{MOMENT}: {with_std(moment.value, moment.std)} {moment.unit} in the records"
         new = self.values[MASS if kind == PAYLOAD else kind]
         return (
             f"{self.parameter}: {_change(replace(new, value=machine.body.parameters[self.parameter]), new)}"
@@ -102,7 +98,7 @@ def _change(before: Estimate, after: Estimate) -> str:
     """A value of the nominal model and that of the records, in words."""
     return (
         f"{before.value:.4g} {after.unit} in the nominal model, "
-        f"{rounded(after.value, after.std)} ± {after.std:.2g} {after.unit} in the records"
+        f"{with_std(after.value, after.std)} {after.unit} in the records"
     )
 
 
@@ -122,8 +118,9 @@ def wrong_link(
     if link in balances.machine.body.centres:
         return wrong
     corrected = JointBalances.of(wrong.put_right(balances.machine), records, balances)
-    centre = centre_instead(balances, records, found, link, corrected)
-    both = load_instead(balances, records, found, link, corrected)
+    centre, both = (
+        refitted_link(balances, records, found, link, corrected, centre_only) for centre_only in (True, False)
+    )
     # its ten numbers were fitted to these efforts: each one beyond those of the simpler cause has to be worth the odds
     price = decisive(1) * np.array([NUMBERS - 1, NUMBERS - PLACES])
     simpler = max(price[0], centre.weight + price[1] if centre.better else 0.0)
@@ -167,10 +164,7 @@ def _of_parameter(
 ) -> WrongLink:
     link, kind = split(parameter)
     if kind == PAYLOAD:
-        payload = placed_payload(balances, records, found, link, shown.joint)
-        values = {"mass": Estimate(payload.mass, payload.mass_std, "kg")}
-        for axis, place, std in zip(AXES, payload.place, payload.place_std, strict=True):
-            values[axis] = Estimate(float(place), float(std), "m")
+        values = placed_payload(balances, records, found, link, shown.joint)
         return WrongLink(parameter, values, shown, f"{BODY}.{parameter}")
     label, chosen = f"{BODY}.{parameter}", shown.result.chosen
     value = chosen.model.parameters[label]

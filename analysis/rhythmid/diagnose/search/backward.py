@@ -36,13 +36,13 @@ def eliminate(
     tried: dict[tuple[str, ...], Trial] = {}
 
     def run(known: Trial, proposals: list[Proposal]) -> list[Trial]:
-        fresh = [p for p in proposals if tuple(sorted(p.added)) not in tried]
+        fresh = [p for p in proposals if p.key not in tried]
         if not fresh:
             return []
         tell(f"testing {', '.join(' + '.join(p.added) for p in fresh)}")
         reach = reach_of(known.chi2, known.samples) + margin
         found, _ = run_trials(fresh, series, Origin.of(known), noise, step, reach=reach, tell=tell)
-        tried.update({tuple(sorted(t.added)): t for t in found})
+        tried.update({t.key: t for t in found})
         return found
 
     best = _without_idle(best, run, margin)

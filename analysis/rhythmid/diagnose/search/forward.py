@@ -131,7 +131,7 @@ class _State:
 
     def with_trials(self, trials: Sequence[Trial]) -> "_State":
         """The state with these trials added."""
-        return replace(self, trials={**self.trials, **{tuple(sorted(one.added)): one for one in trials}})
+        return replace(self, trials={**self.trials, **{one.key: one for one in trials}})
 
     def without(self, tried: Sequence[tuple[tuple[str, ...], str]]) -> "_State":
         """The state with additional exclusions: models that were not tried or could not be simulated."""
@@ -332,14 +332,14 @@ def _ranked(task: _Task, state: _State) -> tuple[Trial, NoiseModel, list[Trial]]
     ranked = _contenders(state.trials, best)
     for _ in range(OVERTAKEN):
         ranked = near_under_noise(ranked, task.series, noise, step, NEAR)
-        best = next(one for one in ranked if set(one.added) == set(best.added))
+        best = next(one for one in ranked if one.key == best.key)
         ahead = state.margin if ranked[0].free > best.free else WORTH
         if ranked[0].bic() >= best.bic() - ahead or not ranked[0].added:
             return best, noise, ranked
         best = ranked[0]  # a model rejected under an earlier noise model is now better than the chosen one
         noise = task.noise_left(best, noise)
     ranked = near_under_noise(ranked, task.series, noise, step, NEAR)
-    return next(one for one in ranked if set(one.added) == set(best.added)), noise, ranked
+    return next(one for one in ranked if one.key == best.key), noise, ranked
 
 
 def _most_likely(
@@ -382,9 +382,9 @@ def _contenders(trials: Mapping[tuple[str, ...], Trial], best: Trial) -> list[Tr
     They are the nominal model, the best of each number of effects, and the chosen model with its effects left out.
     """
     ranked = sorted(trials.values(), key=lambda t: t.bic())
-    kept = {tuple(sorted(t.added)): t for t in [trials[()], best]}
+    kept = {t.key: t for t in [trials[()], best]}
     for count in {len(t.added) for t in ranked if t.added}:
         same = [t for t in ranked if len(t.added) == count][:RIVALS_COMPARED]
-        kept = {tuple(sorted(t.added)): t for t in same} | kept
+        kept = {t.key: t for t in same} | kept
     parts = {key: t for key, t in trials.items() if set(key) < set(best.added)}
     return list((parts | kept).values())

@@ -4,15 +4,8 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from rhythmid.diagnose.search.round import Round, distinct
-from rhythmid.diagnose.search.score_tests import (
-    changes_of,
-    guesses,
-    p_value,
-    score,
-    sizes_along,
-    trajectories,
-)
+from rhythmid.diagnose.search.round import Round, changes_at, distinct
+from rhythmid.diagnose.search.score_tests import p_value, score
 from rhythmid.diagnose.search.trial import Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
@@ -70,10 +63,10 @@ def from_given(
     model = nominal.model.with_values(values)
     try:
         fit = minimise(model, nominal.run, nominal.names, nominal.noise, nominal.starts, 0, pool)
-        known = trajectories(fit)
+        changes = changes_at(fit, catalogue, pool)
     except InputError:
         return []
-    scores = score(fit, changes_of(known, guesses(catalogue, model, sizes_along(known)), pool))
+    scores = score(fit, changes)
     return proposals(model, Round(tuple(scores), p_value(scores)), REFITTED, chi2)[0]
 
 

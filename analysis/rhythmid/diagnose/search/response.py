@@ -34,4 +34,4 @@ def _by_difference(known: "Trajectories", index: int, force: Array) -> Array | N
         return np.zeros(len(path.time))
     share = min(1.0, SMALL * known.push / strength)
     rows = run.rows(fit.model, index, fit.starts[index], first_order_hold(path.time, share * force))
-    return None if rows is None else (rows[:, run.states] - known.outputs[index]) / share
+    return None if rows is None else (rows[:, run.states] - path.signal) / share

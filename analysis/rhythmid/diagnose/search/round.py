@@ -26,7 +26,7 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
-from rhythmid.identify.least_squares import reduced
+from rhythmid.identify.least_squares import column_norms, reduced
 from rhythmid.identify.multiple_shooting import periods_long, windows
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, coloured, minimise
@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 MISFIT = 0.1  # error, as a share of the motion, from which a residual with autocorrelation is not whitened
 # windows in which the catalogue is scored: enough for all amplitudes, few enough to cost less than the records
 WINDOWS = 40
+MOST_REMOVED = 60  # number of guesses whose effects are removed from a residual before its noise is estimated
 REMEMBERED = 4  # minimum length of a window, in correlation times of the noise
 
 
@@ -82,9 +83,7 @@ def distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Scor
     return [(group[0], group) for group in list(found.values())[:count]]
 
 
-def noise_without(
-    fit: Fit, changes: Iterable[Change], filters: Iterable[tuple[Array, ...]] = (), most: int = 60
-) -> NoiseModel:
+def noise_without(fit: Fit, changes: Iterable[Change], filters: Iterable[tuple[Array, ...]]) -> NoiseModel:
     """Noise model of the residual after removing what the catalogue's best guesses and linear filters explain together.
 
     The residual of a model that lacks an effect is not noise. A regular motion can be predicted from its own past; it would be taken
@@ -93,7 +92,7 @@ def noise_without(
     catalogue may lack.
     """
     samples = sum(int(one.used.sum()) for one in fit.run.series)
-    best = best_changes(fit, changes, min(most, samples // 50))
+    best = best_changes(fit, changes, min(MOST_REMOVED, samples // 50))
     residuals = [r.copy() for r in fit.residuals]
     share = 1.0
     picked = [*(one.outputs for one in best), *filters]
@@ -102,8 +101,7 @@ def noise_without(
         design, target = reduced(
             (np.column_stack([c[i][u] for c in picked]), residuals[i][u]) for i, u in enumerate(used)
         )
-        norms = np.linalg.norm(design, axis=0)
-        norms[norms == 0.0] = 1.0
+        norms = column_norms(design)
         solution, _, rank, _ = np.linalg.lstsq(design / norms, -target, rcond=1e-6)
         solution = solution / norms
         share = samples / max(samples - int(rank), 1)
@@ -124,16 +122,16 @@ def one_round(
 
     Otherwise a missing effect, such as a slow drift, would be taken for coloured noise, in later rounds as in the first.
     """
-    noise = noise_without(fit, _changes(fit, catalogue, pool), _filters(fit, pool))
+    noise = noise_without(fit, changes_at(fit, catalogue, pool), _filters(fit, pool))
     if fit.nrmse() > MISFIT and noise.is_structure:
         noise = NoiseModel(np.empty(0), noise.variance**0.5)
     give_back()
     fit = under(fit, noise, pool)
-    scores = score(fit, _changes(fit, catalogue, pool))
+    scores = score(fit, changes_at(fit, catalogue, pool))
     return Round(tuple(scores), p_value(scores), added, tuple(scored_in_windows(fit, catalogue, pool))), fit
 
 
-def _changes(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> Iterator[Change]:
+def changes_at(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> Iterator[Change]:
     """Changes of the output by all first guesses of the catalogue, linearised at the fit."""
     known = trajectories(fit)
     return changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
@@ -169,9 +167,9 @@ def scored_in_windows(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor |
     try:
         run = prepare_run(fit.model, cut, fit.run.max_step)
         local = minimise(fit.model, run, fit.names, _within(fit.noise, cut), None, 10, pool)
-        noise = _within(noise_without(local, _changes(local, catalogue, pool), _filters(local, pool)), cut)
+        noise = _within(noise_without(local, changes_at(local, catalogue, pool), _filters(local, pool)), cut)
         local = under(local, noise, pool)
-        return score(local, _changes(local, catalogue, pool))
+        return score(local, changes_at(local, catalogue, pool))
     except InputError:
         return []
 

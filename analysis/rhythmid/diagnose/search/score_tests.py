@@ -47,7 +47,6 @@ FULL_PRECISION_ROWS = 200_000
 class Change:
     """Change of the free run by one first guess of one element; `outputs` are block averages of each series."""
 
-    key: int
     element: Element
     values: Mapping[str, float]
     outputs: tuple[Array, ...]
@@ -62,7 +61,6 @@ class Score:
     of the effect that they had compensated for.
     """
 
-    key: int
     element: Element
     values: Mapping[str, float]
     statistic: float
@@ -102,22 +100,17 @@ class Score:
 class Trajectories:
     """The fitted free run: paths of all series, and the run to which disturbances are applied.
 
-    `legs` are the paths as seen by the leg: relative to its base where that moves.
+    All signals are at the block centres; a path's `signal` is the sensor's output. `legs` are the paths as seen by the leg:
+    relative to its base where that moves. `push` is the typical force (rms) on the mass in the strongest motion.
     """
 
     fit: Fit
     disturbed: FreeRun
     paths: tuple[Path, ...]
     legs: tuple[Path, ...]
-    outputs: tuple[Array, ...]  # sensor output of each series at its block centres
     commands: tuple[Array, ...]
-    states: tuple[Array, ...]  # states of each series at its block centres
-    shaken: float  # typical acceleration (rms) of the strongest motion
-
-    @property
-    def push(self) -> float:
-        """Typical force on the mass."""
-        return self.fit.model.mass.value * self.shaken
+    states: tuple[Array, ...]
+    push: float
 
     @cached_property
     def tangents(self) -> tuple[Tangent | None, ...]:
@@ -134,7 +127,7 @@ def trajectories(fit: Fit) -> Trajectories:
     disturbed = replace(
         prepare_run(fit.model, run.series, run.max_step, disturbed=True), max_step=run.max_step
     )
-    paths, legs, outputs, commands, states = [], [], [], [], []
+    paths, legs, commands, states = [], [], [], []
     q = run.states
     for index, (one, start) in enumerate(zip(run.series, fit.starts)):
         rows = disturbed.rows(fit.model, index, start)
@@ -150,18 +143,16 @@ def trajectories(fit: Fit) -> Trajectories:
         if one.kind == "base_acceleration":
             acceleration = acceleration + signal
         leg = model.mass.value * acceleration - rows[:, q + 1] - body
-        paths.append(Path(time, rows[:, 0], rows[:, 1], rows[:, q + 1], leg, rows[:, q]))
+        paths.append(Path(time, rows[:, 0], rows[:, 1], rows[:, q + 1], leg, rows[:, q].copy()))
         legs.append(paths[-1])
         if one.kind == "base_displacement" and command is not None:
             rate = _evaluate(command.derivative(), time)
             legs[-1] = replace(paths[-1], position=rows[:, 0] - signal, velocity=rows[:, 1] - rate)
-        outputs.append(rows[:, q].copy())
         states.append(rows[:, :q].copy())
         commands.append(signal)
     shaken = max(float(np.std(np.gradient(path.velocity, path.time))) for path in paths)
-    return Trajectories(
-        fit, disturbed, tuple(paths), tuple(legs), tuple(outputs), tuple(commands), tuple(states), shaken
-    )
+    push = fit.model.mass.value * shaken
+    return Trajectories(fit, disturbed, tuple(paths), tuple(legs), tuple(commands), tuple(states), push)
 
 
 def _evaluate(signal, time: Array) -> Array:
@@ -200,11 +191,10 @@ def change_of_output(
         outputs = kept.outputs(model, fit.starts)
         if outputs is None:
             return None
-        return [new - one.of_block(old) for new, one, old in zip(outputs, run.series, known.outputs)]
+        return [new - one.of_block(old.signal) for new, one, old in zip(outputs, run.series, known.paths)]
     for index, (one, path) in enumerate(zip(run.series, known.paths)):
         model = own_model(fit.model, one)
         if element.slot == "sensor":
-            path = replace(path, signal=known.outputs[index])
             changes.append(one.of_block(effect_along(element, values, model, path)))
             continue
         if element.slot == "actuator":
@@ -256,11 +246,6 @@ def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Arra
     return [one.whitened(noise, given, one.stretches(noise)) for one, given in zip(series, samples)]
 
 
-def projected(fit: Fit, white: Sequence[Array]) -> Array:
-    """A whitened change of each series on the fit's rows (n,), with the effect of initial states projected out."""
-    return np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
-
-
 def parameter_basis(fit: Fit) -> tuple[Array, Array]:
     """Orthonormal basis (n, r) of the output changes by the free parameters, and the parameter changes (p, r) of each."""
     jacobian = fit.linearisation.jacobian
@@ -302,17 +287,17 @@ def changes_of(
     Guesses that make the model diverge, or change nothing, are left out.
     """
 
-    def one(case: tuple[int, tuple[Element, dict[str, float]]]) -> Change | None:
-        key, (element, values) = case
+    def one(case: tuple[Element, dict[str, float]]) -> Change | None:
+        element, values = case
         outputs = change_of_output(known, element, values)
         if outputs is None or not any(np.any(o) for o in outputs):
             return None
         with np.errstate(over="ignore", invalid="ignore"):
             kept = _kept(outputs)
             finite = all(math.isfinite(o @ o) for o in kept)  # the squares in a score must be finite, too
-        return Change(key, element, values, kept) if finite else None
+        return Change(element, values, kept) if finite else None
 
-    return (change for change in each(one, enumerate(candidates), pool) if change is not None)
+    return (change for change in each(one, candidates, pool) if change is not None)
 
 
 def _kept(outputs: Sequence[Array]) -> tuple[Array, ...]:
@@ -342,7 +327,7 @@ def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change]
         with np.errstate(over="ignore", invalid="ignore"):  # changes that overflow in whitening are left out
             white = whitened(fit, one.outputs, fit.noise)
             raw = math.sqrt(sum(float(w @ w) for w in white))
-            joined = projected(fit, white)
+            joined = fit.linearisation.without_starts(white)
             change = joined - left @ (left.T @ joined)
             strength = float(change @ change)
         if not math.isfinite(strength) or raw == 0.0 or strength <= (1e-6 * raw) ** 2:
@@ -353,7 +338,7 @@ def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change]
             statistic = 0.0
         proportional = one.element.size and math.isfinite(one.element.absent)
         beside = dict(zip(fit.names, -made_by @ (left.T @ joined))) if proportional else {}
-        yield Score(one.key, one.element, one.values, statistic, size, beside), one
+        yield Score(one.element, one.values, statistic, size, beside), one
 
 
 def under(fit: Fit, noise: NoiseModel, pool: ThreadPoolExecutor | None = None) -> Fit:

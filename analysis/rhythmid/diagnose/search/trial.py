@@ -36,6 +36,11 @@ class Trial:
     )
     start_cost: float = 0.0  # cost of the free initial states of its elements
 
+    @property
+    def key(self) -> tuple[str, ...]:
+        """The added elements in alphabetical order, equal for equal structures."""
+        return tuple(sorted(self.added))
+
     def bic(self) -> float:
         """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461), plus the cost of free initial states."""
         return self.chi2 + self.free * math.log(max(self.samples, 2)) + self.start_cost
@@ -134,6 +139,11 @@ class Proposal:
     guesses: tuple[dict[str, float], ...]
     ceiling: float = math.inf
     faint: tuple[dict[str, float], ...] = ()
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """The added elements in alphabetical order, equal for equal structures."""
+        return tuple(sorted(self.added))
 
 
 def propose(

@@ -9,6 +9,8 @@ import math
 
 from rhythmid.elements.element import STEP, Element, Parameter
 
+LARGEST_RATIO = 100.0  # of static to kinetic friction: beyond it kinetic friction is below the accuracy of any measured friction
+
 
 def kernel(x, v, t, f, force, static_ratio, stribeck_speed, transition, mass, step):
     falling = v / max(stribeck_speed, 1e-300)
@@ -23,7 +25,7 @@ ELEMENT = Element(
     equation="F = −(F_c + F_s e^{−(v/v_s)²}) sgn v,  F_s = (r − 1) F_c",
     parameters=(
         Parameter("force", "N", "kinetic friction force F_c", bounds=(0.0, math.inf)),
-        Parameter("static_ratio", "1", "ratio r of static to kinetic friction", bounds=(1.0, 100.0)),
+        Parameter("static_ratio", "1", "ratio r of static to kinetic friction", bounds=(1.0, LARGEST_RATIO)),
         Parameter("stribeck_speed", "m/s", "speed v_s over which friction falls", bounds=(0.0, math.inf)),
         Parameter(
             "transition", "m/s", "speed v_t over which the sign turns", bounds=(0.0, math.inf), default=1e-3
@@ -41,7 +43,8 @@ ELEMENT = Element(
         }
         for w in (0.2, 0.6)
     ],
-    ranges=lambda s: {"transition": s.turning},
+    # at a ratio of 1 it is Coulomb friction; at the upper end hardly any kinetic friction is left, and it is a force at low speed only
+    ranges=lambda s: {"transition": s.turning, "static_ratio": (1.0, LARGEST_RATIO)},
     against="base",
     also_known_as=("stiction", "static and kinetic friction", "negative viscous friction"),
     family="friction",

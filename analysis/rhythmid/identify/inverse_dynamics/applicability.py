@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.bandwidth import MUCH, Bandwidth
 from rhythmid.identify.inverse_dynamics.estimate import condition_of, fit_effort, size_of
 from rhythmid.identify.inverse_dynamics.rests import told
 from rhythmid.model import INERTIA, Model
@@ -21,8 +22,8 @@ from rhythmid.simulation.generated_source import OutputKind
 # Schröer, in: Robot Calibration, Chapman & Hall, 1993; M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 aim
 # below it)
 CONDITION = 100.0
-# least share of the effort's power that a free map of the motion explains; with less, this effort does not make the
-# motion
+# least share of the effort's power that a free map of the motion explains in the band of the map; with less, this effort does not make
+# the motion
 EXPLAINED_BY_MOTION = 0.5
 # least variation of the effort relative to the inertial force: below it the machine swings freely, and the balance
 # is a small difference of two large terms (a resonance of 10 % damping is driven by a fifth of its inertial force)
@@ -37,11 +38,12 @@ POINTS = 50  # positions at which a restoring force is evaluated
 class Applicability:
     """Whether the effort can be scored, with the reasons.
 
-    `condition` is the condition number of the scaled columns, `explained` the share of the effort's power that a
-    free map explains, `effort_share` the effort's variation as a share of the inertial force. `restoring` says
+    `condition` is the condition number of the scaled columns, `explained` the share of the effort's power that the
+    motion explains, `effort_share` the effort's variation as a share of the inertial force. `restoring` says
     whether the model has a restoring force for the measured quantity, `closed` whether it has a controller. A long
     free run is meaningful for a machine with a restoring force and without a controller. `recorded` says whether
-    there are rows of effort, `notes` which of them were interpolated. `balance` holds the rows. It is None where a
+    there are rows of effort, `notes` which of them were interpolated, and which band is not compared although the
+    effort goes with the motion there; `band_left_out` says whether there is one. `balance` holds the rows. It is None where a
     free run comes first: the rows of long records are large, and a search rebuilds them where needed.
     """
 
@@ -56,6 +58,7 @@ class Applicability:
     recorded: bool = True
     notes: tuple[str, ...] = ()
     balance: Balance | None = None
+    band_left_out: bool = False
 
     @property
     def free_run_means_something(self) -> bool:
@@ -76,13 +79,13 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
     condition = condition_of(fit)
     driven = balance.motions[0].driven_by_base
     share = 1.0 if driven else float(np.std(balance.measured)) / max(_inertial(balance, model), 1e-300)
-    reason = f"the effort is predicted below {chosen.effort:.3g} Hz, where a free map explains {chosen.explained:.0%} of it"
+    reason = f"the effort is predicted below {chosen.effort:.3g} Hz, where the motion explains {chosen.explained:.0%} of it"
     reason = "; ".join(filter(None, (reason, told(balance.stuck))))
     applies = True
-    if chosen.explained < EXPLAINED_BY_MOTION:
+    if chosen.mapped < EXPLAINED_BY_MOTION:
         applies, reason = (
             False,
-            f"no map of the motion explains more than {chosen.explained:.0%} of the effort",
+            f"no map of the motion explains more than {chosen.mapped:.0%} of the effort",
         )
     elif (varies := float(np.std(balance.measured)) / size_of(balance)) < LEAST_VARIATION:
         applies, reason = (
@@ -100,10 +103,22 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
             f"the motion does not tell the parameters apart (condition number {condition:.3g})",
         )
     restoring = restores(balance, model, records[0].output_kind)
+    left_out = _left_out(chosen)
     return Applicability(
         applies, reason, chosen.effort, condition, chosen.explained, share,
-        restoring, closed, True, tuple(balance.notes), None if restoring and not closed else balance,
+        restoring, closed, True, (*balance.notes, *left_out), None if restoring and not closed else balance,
+        bool(left_out),
     )  # fmt: skip
+
+
+def _left_out(chosen: Bandwidth) -> list[str]:
+    """A note on the band above that of the comparison, where it holds much of the effort that goes with the motion."""
+    if chosen.left_out < MUCH:
+        return []
+    return [
+        f"the effort goes with the motion up to {chosen.left_out_to:.3g} Hz; what lies above {chosen.effort:.3g} Hz, "
+        f"{chosen.left_out:.0%} of its power, is not compared by effort"
+    ]
 
 
 def _inertial(balance: Balance, model: Model) -> float:

@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.balance_rows import sampled, stuck
-from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
+from rhythmid.identify.inverse_dynamics.bandwidth import QUARTER, Bandwidth, bridged
 from rhythmid.identify.inverse_dynamics.inversion import Inversions
 from rhythmid.identify.inverse_dynamics.motion import (
     Motion,
-    Stretch,
     high_pass,
     low_pass,
     motion_of,
     stretches,
 )
 from rhythmid.identify.inverse_dynamics.reference_path import changed_by
+from rhythmid.identify.inverse_dynamics.rest_force import Rests
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import MAX_STEP, Path, effect_along, load_along
@@ -39,9 +39,6 @@ FAST = 0.95  # quantile of the speed that counts as fast
 DECIMATED = 2.5
 MEMORY = 2e8  # bytes of cached forces: a refit computes only what changed
 MANY_ROWS = 200  # least rows kept of a short record; their correlation is taken into account
-# share of the effort's shortest period up to which a gap is bridged: a cubic misses 12 % of a signal of that
-# period, 1.5 % at twice the period
-QUARTER = 0.25
 LEAST_ROWS = 40  # least number of rows for an estimate
 # integration steps of an element's states per sample of the motion (10 samples per cut-off period)
 SUBSTEPS = 4
@@ -62,7 +59,7 @@ class Balance:
     measured : (n,) the recorded effort at the rows, filtered.
     stick_speed : speed below which samples are left out.
     stuck : share of the rows that were left out for this reason.
-    period : sample period [s] of the records, the unit of the alignment.
+    period : sample period [s] of motion or recorded effort, whichever is longer: the unit of the alignment.
     """
 
     motions: tuple[Motion, ...]
@@ -80,11 +77,12 @@ class Balance:
     def of(cls, records: Sequence[Record], model: Model, bandwidth: Bandwidth | None = None) -> "Balance":
         """The balance of these records. Raises InputError where no effort was recorded, or too little of motion."""
         if bandwidth is None:
-            raw, chosen = _bridged(records, model)
+            raw, chosen = bridged(records, model)
         else:
             raw, chosen = stretches(records, model, QUARTER / bandwidth.effort), bandwidth
         motions = [motion_of(one, model, chosen.motion, chosen.low) for one in raw]
-        return cls.of_motions(motions, chosen, max(one.period for one in raw))
+        efforts = [one.effort.period for one in records if one.effort is not None]
+        return cls.of_motions(motions, chosen, max([*efforts, *(one.period for one in raw)]))
 
     @classmethod
     def of_motions(
@@ -118,8 +116,7 @@ class Balance:
             tuple(motions), chosen, tuple(places), np.unique(numbers, return_inverse=True)[1].astype(np.int64),
             np.zeros(count), STICK * speed, 1.0 - count / max(all_rows, 1), period,
         )  # fmt: skip
-        measured = made.rows([one.effort for one in motions])
-        made.measured[:] = measured
+        made.measured[:] = made.rows([one.effort for one in motions])
         return made
 
     def rows(self, signals: Iterable[Array], shift: float = 0.0) -> Array:
@@ -179,6 +176,11 @@ class Balance:
     def undriven(self) -> bool:
         """Whether no motor acts: the recorded effort is zero. An actuator makes nothing of it, so that no law of one is in the balance."""
         return not self.by_reference and not any(motion.effort.any() for motion in self.motions)
+
+    @cached_property
+    def rests(self) -> Rests:
+        """The rests that count as evidence; their samples are not among the rows."""
+        return Rests.of(self)
 
     def later(self, model: Model, alignment: float = 0.0) -> float:
         """Time [s] by which the motion lags the effort, `alignment` [s] beyond the model's delays. It is 0 for an
@@ -383,18 +385,3 @@ class Balance:
             ]
             self._sensitive[name] = bool(np.any(two[0] != two[1]))
         return self._sensitive[name]
-
-
-def _bridged(records: Sequence[Record], model: Model) -> tuple[list[Stretch], Bandwidth]:
-    """The stretches of these records and their bandwidth. Gaps that are short relative to the effort's shortest
-    period are bridged.
-
-    The bandwidth is first estimated from the stretches between all gaps, then again from the resulting longer ones.
-    """
-    raw = stretches(records, model)
-    chosen = bandwidth_of(raw, model)
-    longer = stretches(records, model, QUARTER / chosen.effort)
-    if not any(one.bridged for one in longer):
-        return raw, chosen
-    chosen = bandwidth_of(longer, model)
-    return stretches(records, model, QUARTER / chosen.effort), chosen

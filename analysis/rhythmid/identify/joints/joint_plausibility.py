@@ -61,8 +61,11 @@ def likely_joint_mend(machine: Machine, records: Sequence[JointRecord]) -> str |
             whole = _searched(motion, free)
             for one in (_told_alone(motion, whole), whole):
                 if one != motion.as_declared and _convinces(motion, one, declared):
-                    told.append((_cost(motion, one), _words(motion, one, declared)))
                     break
+            else:
+                one = _by_own_equation(motion, whole, declared)
+            if one != motion.as_declared:
+                told.append((_cost(motion, one), _words(record, motion, one, declared)))
         mounting = likely_mounting(motion)
         if mounting is not None and _fits(mounting.left, declared):
             words = f"{mounting.words()}. {_gain(motion, mounting.left, declared)}"
@@ -109,7 +112,7 @@ def _searched(motion: RecordedMotion, free: bool) -> Readings:
     best = motion.as_declared
     least = score(best)
     while True:
-        tried = ((score(one), one) for one in _changed(motion, best, free))
+        tried = ((score(one), one) for one in _changed(motion, best))
         found, reading = min(tried, key=lambda one: one[0])
         if found >= least:
             tried = ((score(one), one) for one in _cycled(best))
@@ -145,7 +148,7 @@ def _with(readings: Readings, place: int, one: Reading) -> Readings:
     return (*readings[:place], one, *readings[place + 1 :])
 
 
-def _changed(motion: RecordedMotion, readings: Readings, free: bool) -> Iterator[Readings]:
+def _changed(motion: RecordedMotion, readings: Readings) -> Iterator[Readings]:
     """Readings with one further change: of all joints, of one, or an exchange of two."""
     turned = [replace(one, effort=-one.effort) for one in readings]
     yield tuple(turned)
@@ -193,6 +196,28 @@ def _told_alone(motion: RecordedMotion, found: Readings) -> Readings:
     )
 
 
+def _by_own_equation(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]) -> Readings:
+    """The reading with what it changes at joints whose own equation tells it, whatever is left at the others.
+
+    The factor of an effort stands in the equation of its own joint alone. As declared, the body explains nothing of
+    that effort; with the factor it explains most of it, beyond what losses do. What is left may be large, because
+    friction or a load may be missing, but not where the factor is a unit, which such a part could imitate. Positions
+    stand in the equations of all joints, so their changes are judged together.
+    """
+    given = motion.as_declared
+    if any(replace(one, effort=own.effort) != own for one, own in zip(found, given, strict=True)):
+        return given
+    return tuple(
+        one
+        if known.told >= LEAST_EXPLAINED
+        and was.told == 0.0
+        and known.left <= BETTER_UNIT * was.left
+        and (abs(one.effort) == 1.0 or known.left <= POOR_MOTION)
+        else own
+        for one, own, known, was in zip(found, given, motion.balanced(found), declared, strict=True)
+    )
+
+
 def _convinces(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]) -> bool:
     """Whether a reading explains by the body what the declared one does not. An effort that a controller applies
     against the motion looks, with the opposite sign, like that of a spring and a damper."""
@@ -230,7 +255,7 @@ def _rms(values: Iterable[float]) -> float:
     return float(np.sqrt(np.mean(np.square(list(values)))))
 
 
-def _words(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]) -> str:
+def _words(record: JointRecord, motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]) -> str:
     joints, left = motion.joints, motion.balanced(found)
     said: list[str] = []
     moved = [
@@ -256,8 +281,12 @@ def _words(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]
         roles = "'effort:'" if channel == "effort" else "'output:'"
         if channel == "position" and any(joint in motion.computed for joint in every):
             roles += " and 'input:'"
+        scales = record.scales.get("output" if channel == "position" else "effort", {})
+        wanted = {joint: every.get(joint, 1.0) * scales.get(joint, 1.0) for joint in joints}
+        wanted = {joint: one for joint, one in wanted.items() if joint in every or one != 1.0}
+        instead = " in place of the scale that is there" if any(one != 1.0 for one in scales.values()) else ""
         said.append(
-            f"the {channel} of {', that of '.join(clauses)}; write  {_scale(every, joints)}  under {roles}"
+            f"the {channel} of {', that of '.join(clauses)}; write  {_scale(wanted, joints)}  under {roles}{instead}"
         )
     mirrored = tuple(replace(one, position=-one.position, effort=-one.effort) for one in found)
     if (

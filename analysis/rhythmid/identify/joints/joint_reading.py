@@ -23,6 +23,7 @@ from rhythmid.identify.inverse_dynamics.bandwidth import bandwidth_of_motion
 from rhythmid.identify.inverse_dynamics.motion import FINER, Stretch, low_pass
 from rhythmid.identify.joints.joint_motion import CLEAR
 from rhythmid.identify.joints.joint_stretch import TOUCHING_DISTANCE, JointStretch, joint_stretches
+from rhythmid.identify.least_squares import column_norms
 from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
 
@@ -225,8 +226,7 @@ def _shared(joints: Sequence[tuple[Array, Array]], scale: Array) -> tuple[Array,
         whole[part, 6 + own * place : 6 + own * (place + 1)] = centred[:, 6:]
         wanted[part] = (one - one.mean()) / size
         parts.append(part)
-    norms = np.linalg.norm(whole, axis=0)
-    norms[norms == 0.0] = 1.0
+    norms = column_norms(whole)
     values, _ = nnls(whole / norms, wanted)
     values = values / norms
     missed = wanted - whole @ values
@@ -238,8 +238,7 @@ def _without_sign(columns: Array, wanted: Array) -> tuple[Array, float]:
     """Nonnegative factors (p,) of the columns (n, p) that fit `wanted` (n,) best together with a constant, and the
     rms residual."""
     columns, wanted = columns - columns.mean(axis=0), wanted - wanted.mean()
-    norms = np.linalg.norm(columns, axis=0)
-    norms[norms == 0.0] = 1.0
+    norms = column_norms(columns)
     values, missed = nnls(columns / norms, wanted)
     return values / norms, float(missed) / math.sqrt(len(wanted))
 

@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from rhythmid.identify.caution import GIVEN_VALUES
-from rhythmid.report.quantity import number, rounded
+from rhythmid.report.quantity import rounded, written_percent
 from rhythmid.report.terminal_table import print_table
 
 if TYPE_CHECKING:
@@ -41,9 +41,9 @@ def show_identification(found: "MachineIdentification", console: Console) -> Non
             centre = ", ".join(f"{values[name] / values['m']:.4g}" for name in ("mx", "my", "mz"))
             console.print(f"{escape(link)}: mass {values['m']:.4g} kg, centre at ({centre}) m")
     for joint, error in found.effort_nrmse.items():
-        runs = ", ".join(f"{number(100.0 * one[joint], 3)} % {name}" for name, one in found.free_run.items())
+        runs = ", ".join(f"{written_percent(one[joint])} {name}" for name, one in found.free_run.items())
         console.print(
-            f"{escape(joint)}: effort missed by {number(100.0 * error, 3)} %; free run, held out: {runs or 'none'}"
+            f"{escape(joint)}: effort missed by {written_percent(error)}; free run, held out: {runs or 'none'}"
         )
     for label, lines in (("not separable", found.not_separable), ("note", found.notes)):
         for line in lines:

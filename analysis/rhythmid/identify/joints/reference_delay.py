@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import FARTHEST, Alignment, EffortFit, fit_effort
+from rhythmid.identify.inverse_dynamics.estimate import FARTHEST, ROUGH, Alignment, EffortFit, fit_effort
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.least_squares import orthonormal
 from rhythmid.identify.student import weights_of
@@ -27,10 +27,6 @@ from rhythmid.statistics import NORMAL_95
 Array = NDArray[np.float64]
 LONGEST_REFERENCE_DELAY = 0.1  # [s] largest delay of a reference
 FIRST = 3  # Gauss-Newton steps of the fit before the scan of delays: the parameters are nearly linear
-# share of a sample that timestamp jitter and interpolation add to the standard deviation of a joint's delay
-# (measured: delays of joints on one bus scatter by 0.01 to 0.02 of a sample; their standard deviations from noise
-# alone are smaller)
-ROUGH = 0.03
 # share of a sample: standard deviation within which joints count as agreeing, as a missing effect may shift the
 # phase of one
 AGREES = 0.5

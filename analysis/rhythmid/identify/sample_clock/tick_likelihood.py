@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rhythmid.deadline import time_is_up
 from rhythmid.errors import InputError
+from rhythmid.identify.least_squares import column_norms
 from rhythmid.identify.output_error import Fit, minimise, noise_of
 from rhythmid.identify.sample_clock.clock import clock_of
 from rhythmid.identify.sample_clock.tick_scan import scanned
@@ -111,7 +112,8 @@ def _grid(period: float, longest: float, sample: float, reach: float, late: floa
 
 def _costs(fit: Fit, places: Sequence[int], cases: Array, pool: ThreadPoolExecutor | None) -> Array:
     """Chi2 (n,) of the cases with all other fitted parameters following linearly; infinite where the model diverges."""
-    others, _ = np.linalg.qr(_scaled(np.delete(fit.linearisation.jacobian, places, axis=1)))
+    columns = np.delete(fit.linearisation.jacobian, places, axis=1)
+    others, _ = np.linalg.qr(columns / column_norms(columns))
     outputs = fit.run.many([(moved_to(fit, places, case), fit.starts) for case in cases], pool)
     costs = np.full(len(cases), np.inf)
     for number, given in enumerate(outputs):
@@ -125,9 +127,4 @@ def white_residual(fit: Fit, residuals: Sequence[Array]) -> Array:
     """Whitened residuals, with the effect of initial states projected out."""
     problem = Problem(fit.run, fit.names, fit.noise, None)
     white = [problem.whitened(index, residual) for index, residual in enumerate(residuals)]
-    return np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
-
-
-def _scaled(columns: Array) -> Array:
-    norms = np.linalg.norm(columns, axis=0)
-    return columns / np.where(norms > 0.0, norms, 1.0)
+    return fit.linearisation.without_starts(white)

@@ -144,6 +144,6 @@ def _costs(
         if residuals is None:
             continue
         white = [problem.whitened(i, r) for i, r in enumerate(residuals)]
-        joined = np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, linearisation.bases)])
+        joined = linearisation.without_starts(white)
         costs[number] = float(joined @ joined) - float(np.sum((left.T @ joined) ** 2))
     return costs

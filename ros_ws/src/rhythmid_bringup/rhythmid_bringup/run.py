@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 
 from rhythmid.body.joint_experiment import JointExperiment
 from rhythmid.body.joint_graph import describes_joints
@@ -83,6 +84,10 @@ def run_graph(
     """
     require_new(report)
     experiment = load(path, out)
+    if isinstance(experiment, Experiment):
+        experiment = experiment.as_stated if "plant" in (replaced or ()) else experiment
+        for note in experiment.notes:
+            console.print(f"note: {escape(note)}")
     folder = Path(tempfile.mkdtemp(prefix="rhythmid-"))
     with own_domain() as domain, interruptions() as interrupted:
         state.begun = True

@@ -162,7 +162,8 @@ class TwinNode(GraphNode):
             for key, value in ear.lateness.summary(f"{topic} lateness").items():
                 found[key.replace("_mean_ms", " mean [ms]").replace("_p99_ms", " p99 [ms]").replace("_max_ms", " max [ms]")] = value  # fmt: skip
             found[f"{topic} lost"] = str(ear.subscription.lost)
-        return {**found, "samples refused": str(self._watch.twin.refused)}
+        twin = self._watch.twin
+        return {**found, "samples refused": str(twin.refused), "outliers left out": str(twin.outliers)}
 
     def obstacles(self) -> list[str]:
         return [
