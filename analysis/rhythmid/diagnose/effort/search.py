@@ -124,6 +124,8 @@ def search_effort(
         if better is None:
             break
         chosen = better
+    for beside in search.at_end:  # after the steps, of which each fits only what is not known
+        search.in_parts(*beside)
     made = search.predicted(search.found)
     best = search.found[max(range(len(made)), key=lambda index: made[index].score)]
     for one in (chosen, best) if best is not chosen else (chosen,):
@@ -148,6 +150,7 @@ class _Search:
     recorded: Array | None = None  # at their own stamps
     tried: set[str] = field(default_factory=set)
     ruled_out: list[Fitted] = field(default_factory=list)
+    at_end: list[tuple[Fitted, Element]] = field(default_factory=list)  # with what such a law was added to
     cut: dict[str, str] = field(default_factory=dict)  # not tried for lack of time
 
     @property
@@ -186,7 +189,7 @@ class _Search:
                     continue
                 (new if keeps_shape(fitted.shape) else self.ruled_out).append(fitted)
                 if one.start.element is not None and fitted.shape[AT_END] < SHAPES[AT_END]:
-                    self._in_parts(base, one.start.element)
+                    self.at_end.append((base, one.start.element))
         if not new:
             return None
         new = self._nearer(new)
@@ -293,16 +296,15 @@ class _Search:
             if term is not None:
                 self._simplify(base, term.element)
 
-    def _in_parts(self, base: Fitted, law: Element) -> None:
+    def in_parts(self, base: Fitted, law: Element) -> None:
         """Fit the base with the effects that together are a law at the end of its range."""
         made: Fitted | None = base
         for name in law.beyond:
-            if made is None or any(name == t.element.name for t in made.fit.model.terms):
-                continue
-            model = made.fit.model
-            starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
-            screened = screen(self.balance, made.fit, [one for one in starts if one.name == name])
-            made = self.fitted(made, screened[0]) if screened else None
+            if made is not None and all(name != t.element.name for t in made.fit.model.terms):
+                model = made.fit.model
+                starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
+                screened = screen(self.balance, made.fit, [one for one in starts if one.name == name])
+                made = self.fitted(made, screened[0]) if screened else None
         self._keep(made or base)
 
     def _keep(self, fitted: Fitted) -> None:
