@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import legged
 import numpy as np
 import pytest
 from legged import MODELS, fixed_leg, recorded, references
@@ -149,3 +150,30 @@ def test_an_inertia_that_does_what_the_rotor_does_is_left_to_the_rotor(leg: Mach
     assert most == pytest.approx(max(known["thigh.inertia"] - known["hip.armature"], 0.0))
     heavier = leg.with_inertial({"thigh.inertia": 2.5 * known["thigh.inertia"]})
     assert named(diagnose_machine([swung(heavier)], leg)) == {"hip": ("armature", None)}
+
+
+# principal moments in MuJoCo's order, so that its compiler marks the frames as the same
+ALIGNED = legged.TWO_LINKS.replace(' rpy="0.1 0.2 0"', "").replace(
+    'ixx="0.01" iyy="0.012"', 'ixx="0.012" iyy="0.01"'
+)
+ALIGNED = ALIGNED.replace('-0.4"/><axis xyz="0 1 0"/>', '-0.4"/><axis xyz="1 0 0"/>')
+
+
+def test_a_link_whose_file_has_its_inertia_along_the_frame_may_have_any_other(tmp_path: Path):
+    def body(text: str) -> MujocoBody:
+        (tmp_path / "two.urdf").write_text(text)
+        return MujocoBody.load(tmp_path / "two.urdf", contacts=False)
+
+    plain = body(ALIGNED)
+    other = body(ALIGNED.replace('izz="0.004" ixy="0" ixz="0"', 'izz="0.004" ixy="0.002" ixz="0.001"'))
+    at_origin = body(ALIGNED.replace('xyz="0 0.02 -0.15"', 'xyz="0 0 0"'))
+    motion = random_motion(plain)
+    change = other.inertial("lower") - plain.inertial("lower")
+    asked = other.inverse(*motion)
+    assert np.abs(asked - plain.inverse(*motion)).max() > 1e-4
+    added = plain.inertial_columns("lower", *motion) @ change
+    assert plain.inverse(*motion) + added == pytest.approx(asked, abs=1e-9)
+    same = plain.with_inertials({"lower": other.inertial("lower")})
+    assert same.inverse(*motion) == pytest.approx(asked, abs=1e-9)
+    moved = at_origin.with_centres({"lower": np.array([0.0, 0.02, -0.15])})
+    assert moved.inverse(*motion) == pytest.approx(plain.inverse(*motion), abs=1e-9)

@@ -238,7 +238,7 @@ def _diagnosed_machine(task: Task, machine: Machine) -> Answered:
     return Answered(
         headline=found.summary,
         verdict=found.verdict,
-        missing=tuple(sorted(f"{one.joint}: {one.element}" for one in found.missing)),
+        missing=tuple(sorted(f"{one.place}: {one.element}" for one in found.missing)),
         time=_began(one for record in records for one in record.joints.values()),
         content=content_digest(records),
         values=values,

@@ -74,9 +74,21 @@ class Principal:
         return replace(self, moments=moments)
 
     def put_into(self, model: Any, link: int) -> None:
-        """Set the inertia of a link of a compiled model."""
+        """Set the inertia of a link of a compiled model.
+
+        The compiler marks frames that coincide, and MuJoCo then reads only one of them: a link that is marked keeps its centre and its axes.
+        """
+        mj = mujoco()
         model.body_mass[link], model.body_inertia[link] = self.mass, self.moments
         model.body_ipos[link], model.body_iquat[link] = self.centre, self.turn
+        apart = int(mj.mjtSameFrame.mjSAMEFRAME_NONE)
+        model.body_sameframe[link] = apart
+        with_inertia = [int(mj.mjtSameFrame.mjSAMEFRAME_INERTIA), int(mj.mjtSameFrame.mjSAMEFRAME_INERTIAROT)]
+        for owner, same in (
+            (model.geom_bodyid, model.geom_sameframe),
+            (model.site_bodyid, model.site_sameframe),
+        ):
+            same[(owner == link) & np.isin(same, with_inertia)] = apart
 
 
 @dataclass(frozen=True, eq=False)

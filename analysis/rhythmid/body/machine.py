@@ -163,6 +163,10 @@ class Machine:
         }
         return replace(self, body=body, paths=paths)
 
+    def with_gravity(self, gravity: Array) -> "Machine":
+        """A copy on which gravity (3,) [m/s^2] acts in the frame of the file's world."""
+        return replace(self, body=self.body.with_gravity(gravity))
+
     def with_centre(self, link: str, place: Array) -> "Machine":
         """A copy whose link has its centre of mass at a place (3,) [m] of its frame. Raises InputError for a link that does not exist."""
         body = self.body.with_centres({link: place})

@@ -56,6 +56,7 @@ class Hypothesis:
     richer : for each name, the laws that contain it.
     values : the fitted values of the free parameters.
     family : for each name of the catalogue, its family; "" where it has none.
+    beyond : for each name, the effects that together are the law where a parameter is at the end of its range.
     """
 
     elements: tuple[str, ...]
@@ -68,6 +69,7 @@ class Hypothesis:
     richer: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
     family: Mapping[str, str] = field(default_factory=dict)
+    beyond: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -80,7 +82,10 @@ class Hypothesis:
         effects = [one.element for one in terms if one is not None]
         richer = {one.name: one.special_case_of for one in effects}
         family = {one.name: one.family for one in effects}
-        return cls(elements, names, kind, free, prediction, heldout_nrmse, shape, richer, values, family)
+        beyond = {one.name: one.beyond for one in effects if one.beyond}
+        return cls(
+            elements, names, kind, free, prediction, heldout_nrmse, shape, richer, values, family, beyond
+        )
 
     @property
     def effects(self) -> tuple[str, ...]:

@@ -121,9 +121,10 @@ def _needed_of_mismatch(claim: Claim) -> float:
     return RICHER if richer else MISMATCH
 
 
+AT_END = "within_bounds"  # the shape of a law whose parameters are inside its range
 # lower limits of statistics of the fitted effects themselves; a hypothesis below one of them does not compete
 SHAPES: Mapping[str, float] = {
-    "within_bounds": EDGE,
+    AT_END: EDGE,
     "acts_within_records": EDGE,
     "own_frequency": OWN_LINE,
     "moves_the_machine": MOVES,
@@ -214,7 +215,7 @@ RULES: tuple[Rule, ...] = (
         lambda _: decisive(1),
     ),
     _shape_rule(
-        "within_bounds",
+        AT_END,
         "distance of the effect's parameters from the bounds within which its name applies, as a share of the bound; and of its size from that "
         "of no effect, as a share of its first guess",
         "only a limit of its parameters is identifiable, where it is another effect",

@@ -13,6 +13,7 @@ from rhythmid.diagnose.constants import EQUIVALENT, RICHER
 from rhythmid.diagnose.evidence import removed, weight_for
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, special_case
 from rhythmid.diagnose.rejections import (
+    AT_END,
     OVER_CONTAINED,
     OVER_SIMPLER,
     Claim,
@@ -129,7 +130,28 @@ def select(contest: Contest) -> Selection:
             # a difference of rounding must not decide
             smaller = max(smaller, sound[0], key=lambda one: round(one.prediction.score, 6))
     chosen = _beside_others(chosen, contest, {row.hypothesis for row in told})
-    return Selection(chosen, tuple(told))
+    return Selection(_in_parts(chosen, contest, told), tuple(told))
+
+
+def _in_parts(chosen: Hypothesis, contest: Contest, told: Sequence[Rejection]) -> Hypothesis:
+    """The chosen hypothesis, or one with the parts of a law that predicts decisively better at the end of its range.
+
+    There the law is the sum of others: a friction that acts in one direction only is a constant force and a friction. Its name does not apply,
+    but its evidence is for the parts, which have as many parameters.
+    """
+    best = chosen
+    for law in contest.ruled_out:
+        against = {row.name for row in told if row.hypothesis == law.elements}
+        better = weight_for(law.prediction, best.prediction) > decisive(1)
+        if against != {AT_END} or not better or len(law.elements) > max(len(chosen.elements), 1):
+            continue
+        for name, parts in law.beyond.items():
+            names = sorted([*(one for one in law.names if one != name), *parts])
+            found = [
+                one for one in contest.hypotheses if sorted(one.names) == names and keeps_shape(one.shape)
+            ]
+            best = max([best, *found], key=lambda one: one.prediction.score)
+    return best
 
 
 def _beside_others(chosen: Hypothesis, contest: Contest, refused: Collection[tuple[str, ...]]) -> Hypothesis:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from scipy.stats import t as student
 
 from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, LEFT, STATED
-from rhythmid.diagnose.evidence import chance_better, difference, gain_ahead, removed
+from rhythmid.diagnose.evidence import chance_better, difference, gain_ahead, removed, weight_for
 from rhythmid.diagnose.family import MissingFamily, families_of
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, Verdict
 from rhythmid.diagnose.probability import (
@@ -16,7 +16,7 @@ from rhythmid.diagnose.probability import (
     removed_by,
     weights_of,
 )
-from rhythmid.diagnose.rejections import decisive, keeps_shape
+from rhythmid.diagnose.rejections import FEW, decisive, keeps_shape
 from rhythmid.diagnose.selection import Contest, Selection, equivalent
 from rhythmid.diagnose.verdict_rules import Outcome, rule_for
 from rhythmid.simulation.transport import INPUT_DELAY
@@ -64,6 +64,7 @@ class Decision:
     unexplained : what is left.
     beside : names of further effects of the chosen model that are too uncertain to be stated.
     families : families of the chosen hypothesis' effects, where the verdict tells them.
+    agreed : labels of the chosen effects whose names nearly all of the evidence contains, whatever stands beside them.
     """
 
     verdict: Verdict
@@ -78,6 +79,7 @@ class Decision:
     unexplained: Unexplained
     beside: tuple[str, ...] = ()
     families: tuple[MissingFamily, ...] = ()
+    agreed: tuple[str, ...] = ()
 
 
 def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
@@ -146,6 +148,25 @@ def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:
         share = max(last, 0.5 * (last + first)) / whole if whole > 0.0 else 0.0
         found[label] = float(min(max(share, 0.0), 1.0))
     return found
+
+
+def withheld(contest: Contest, selection: Selection) -> float:
+    """Largest rms that one effect removes from the nominal model's error though it is not accepted, for too few blocks of data and nothing else.
+
+    As the only candidate it would be accepted: its odds are decisive, but not among all that were tried.
+    """
+    reasons: dict[tuple[str, ...], list[str]] = {}
+    for row in selection.rejections:
+        reasons.setdefault(row.hypothesis, []).append(row.reason)
+    nominal = contest.nominal.prediction
+    removed_by_one = [
+        nominal.mean_square - one.prediction.mean_square
+        for one in contest.of_size(1)
+        if one.kind == "effects"
+        and reasons.get(one.elements) == [FEW]
+        and weight_for(one.prediction, nominal) >= decisive(1)
+    ]
+    return math.sqrt(max(removed_by_one, default=0.0))
 
 
 def lost_share(contest: Contest, chosen: Hypothesis) -> float:
@@ -248,6 +269,7 @@ def decide(
         joint_probability([names[label] for label in labels], contest, chosen, weights),
         bool(groups),
         contest.cut_short,
+        withheld(contest, selection) / max(contest.unnamed * contest.size, 1e-300),
     )
     rule = rule_for(found)
     named = stated if rule.verdict == "missing_physics" else labels
@@ -265,6 +287,12 @@ def decide(
         left,
         tuple(names[label] for label in labels if label not in named and label in chosen.effects),
         families_of(contest, chosen, shares, weights, lost, open_, size_errors) if rule.tells_family else (),
+        tuple(
+            label
+            for label in labels
+            if label in chosen.effects
+            and joint_probability([names[label]], contest, chosen, weights) >= STATED
+        ),
     )
 
 

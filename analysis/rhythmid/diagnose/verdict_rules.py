@@ -43,6 +43,8 @@ class Outcome:
     evidence : share of the evidence held by hypotheses that contain all of its names.
     alike : whether other names predict as well in place of one of them.
     cut_short : whether the budget ended the search before all effects that scored well were tried.
+    withheld : rms that one effect removes though it is not accepted, because its gain rests on too few blocks, relative to the smallest size
+        of practical importance.
     """
 
     kind: Kind
@@ -61,6 +63,7 @@ class Outcome:
     evidence: float
     alike: bool
     cut_short: bool = False
+    withheld: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -156,6 +159,16 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "these records would not show an effect below {detectable:.0f} % of what was measured",
         _alone(lambda found: found.detectable),
     ),
+    VerdictRule(
+        "few_blocks",
+        "no effect is accepted: rms that one effect removes whose gain rests on too few blocks, divided by that of practical importance (as for "
+        "`unnamed_remainder`)",
+        1.0,
+        "undecided",
+        "the refitted nominal model misses {missed:.2g} % of what was measured; an effect that would remove a good part of it is not established, because "
+        "its gain rests on too few blocks of the records",
+        _alone(lambda found: found.withheld),
+    ),
     VerdictRule("nothing_missing", "no effect is accepted (1)", 0.0, "consistent", "", _alone(lambda _: 1.0)),
     VerdictRule(
         "freed_value",
@@ -164,6 +177,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "undecided",
         "a value that the nominal model holds fixed explains the records when it is free",
         lambda found: float(found.value_alone),
+        tells_family=True,
     ),
     VerdictRule(
         "longer_delay",
@@ -289,7 +303,7 @@ def _words(reason: str) -> str:
         "lost": "…",
         "detectable": "…",
     }
-    return reason.replace(":.0f", "").format(**figures)
+    return reason.replace(":.0f", "").replace(":.2g", "").format(**figures)
 
 
 if __name__ == "__main__":

@@ -202,6 +202,9 @@ class Element:
     rigid: bool = False
     candidate: bool = True  # used in the search for missing effects
     needless_with: tuple[str, ...] = ()
+    beyond: tuple[
+        str, ...
+    ] = ()  # effects that together are the law where a parameter is at the end of its range
     same_as: tuple[str, ...] = ()  # elements that give the same model with other parameters
     same_beside: Mapping[str, str] = field(
         default_factory=dict

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.diagnose.joints.joint_answer import BASE
 from rhythmid.diagnose.joints.misfit import left_in_words
 from rhythmid.report.blocks import (
     Block,
@@ -64,7 +65,7 @@ def joints_page(
 ) -> Page:  # fmt: skip
     """The report of a diagnosis of several joints; `result` is what `--json` writes."""
     verdict, tone = VERDICTS[result["verdict"]]
-    named = ", ".join(f"{pretty_name(one['element'])} at {one['joint']}" for one in result["missing"])
+    named = ", ".join(f"{pretty_name(one['element'])}{_at(one)}" for one in result["missing"])
     if named:
         verdict = f"{verdict}: {named}"
     return Page(
@@ -87,6 +88,14 @@ def joints_page(
             reproduce_section(command, models),
         ),
     )
+
+
+def _place(effect: Mapping[str, Any]) -> str:
+    return str(effect["joint"] or BASE)
+
+
+def _at(effect: Mapping[str, Any]) -> str:
+    return f" at {effect['joint']}" if effect["joint"] else ""
 
 
 def _robot(robot: Sequence[DrawnJoint]) -> Block:
@@ -118,10 +127,11 @@ def _table(result: Mapping[str, Any]) -> Table:
 def _missing(result: Mapping[str, Any]) -> list[Block]:
     blocks: list[Block] = []
     for one in result["missing"]:
-        where = f"{one['joint']}, slot {one['slot']}: {pretty_name(one['element'])}"
+        where = f"{_place(one)}, slot {one['slot']}: {pretty_name(one['element'])}"
+        whose = "the joint's" if one["joint"] else "a joint's"
         blocks.append(
             Paragraph(
-                f"{where}. It explains {percent(one['share'])} of the joint's mismatch; the probability of the name is "
+                f"{where}. It explains {percent(one['share'])} of {whose} mismatch; the probability of the name is "
                 f"{probability(one['probability'])}."
             )
         )
@@ -131,7 +141,7 @@ def _missing(result: Mapping[str, Any]) -> list[Block]:
             std = NONE if value["std"] is None else number(value["std"], 2)
             rows.append((name, with_unit(number(value["value"], 4), value["unit"]), std))
         blocks.append(
-            Table(f"Parameters at {one['joint']}", ("parameter", "value", "standard deviation"), tuple(rows))
+            Table(f"Parameters at {_place(one)}", ("parameter", "value", "standard deviation"), tuple(rows))
         )
     return blocks
 

@@ -59,7 +59,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     held = held_out_words(case.holdout, "") if unseen else "held out: every block of the records in its turn"
     return Diagnosis(
         verdict=decision.verdict,
-        summary=summary_of(decision, missing, before, after, "effort", freed),
+        summary=summary_of(decision, missing, before, after, "effort", freed, noise_known=False),
         detection=Detection(None, None, before.train_nrmse, after.train_nrmse),
         location=Location(slots[0] if slots else None, where, (result.applicability.reason,)),
         missing=missing,

@@ -62,6 +62,14 @@ def _some_form_of(decision: Decision, stated: Sequence[str] = ()) -> str:
     return f"The model lacks {' and '.join(told)}" if told else ""
 
 
+def _agreed(decision: Decision) -> str:
+    """The effects that nearly all of the evidence contains, in a sentence; empty where there are none."""
+    if not decision.agreed:
+        return ""
+    names = listed(decision.agreed)
+    return f"Whatever is beside it, nearly all of the evidence has {names}. "
+
+
 def _alike(decision: Decision) -> str:
     groups = "; nor ".join(listed(group) for group in decision.equivalent)
     return f"These records do not separate {groups}."
@@ -74,24 +82,27 @@ def summary_of(
     augmented: FitQuality,
     whole: str,
     freed: str | None = None,
+    noise_known: bool = True,
 ) -> str:
     """The verdict in a sentence or two.
 
     `whole` is the quantity that errors are a share of. `freed` describes the fixed value that the chosen hypothesis
-    frees, if any.
+    frees, if any. `noise_known`: whether the noise is known otherwise than as what the model leaves.
     """
     names = listed([effect.element for effect in missing])
     value = "" if freed is None else _begun(freed)
     if value and decision.verdict != "missing_physics":
-        return value
+        return f"{_agreed(decision)}{value}"
     if decision.verdict == "consistent":
         said = "Nothing of practical size is missing: with its parameters refitted, the nominal model explains the records"
         left = decision.unexplained
+        if noise_known and not left.significant:
+            return f"{said} down to the noise."
+        error = plain.train_nrmse if plain.heldout_nrmse is None else plain.heldout_nrmse
+        small = f"{number(100.0 * error, 2)} % of the {whole}"
         if left.significant:
-            error = plain.train_nrmse if plain.heldout_nrmse is None else plain.heldout_nrmse
-            small = f"{number(100.0 * error, 2)} % of the {whole}"
             return f"{said} but for {small}, part of which depends on {left.goes_with}."
-        return f"{said} down to the noise."
+        return f"{said} but for {small}, in which no test finds a cause."
     if decision.verdict == "missing_physics":
         said = f"The model lacks {names}."
         if decision.equivalent:

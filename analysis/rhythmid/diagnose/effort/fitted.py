@@ -1,7 +1,8 @@
 """A fitted hypothesis about an effort, in the form that the evidence needs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,3 +82,17 @@ class Fitted:
     def std(self) -> dict[str, float]:
         """Standard deviations of the estimated parameters, inflated by the residual's autocorrelation."""
         return dict(zip(self.fit.names, np.asarray(self.fit.std[1:]).tolist(), strict=True))
+
+
+def kind_of(elements: Sequence[str], model: Model) -> Kind:
+    """The kind of hypothesis that these additions to the nominal model make."""
+    if not elements:
+        return "nominal"
+    if INPUT_DELAY in elements:
+        return "delay"
+    return "effects" if all(model.term(label) is not None for label in elements) else "freed_value"
+
+
+def worst(*shapes: Mapping[str, float]) -> dict[str, float]:
+    """The smallest value of each statistic."""
+    return {name: min(one[name] for one in shapes if name in one) for name in dict.fromkeys(chain(*shapes))}

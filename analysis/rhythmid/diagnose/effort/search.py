@@ -7,7 +7,6 @@ place: an addition replaces a related law instead of standing beside it.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +27,13 @@ from rhythmid.diagnose.effort.candidate import (
     starts_of,
     widest,
 )
-from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.effort.fitted import Fitted, kind_of, worst
 from rhythmid.diagnose.effort.kin import at_values_of, contained, kin, shortlist
 from rhythmid.diagnose.effort.reference import Mapped, reference_of
 from rhythmid.diagnose.effort.scales import scales_at, scales_of
 from rhythmid.diagnose.evidence import Blocks, predict
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction, special_case
-from rhythmid.diagnose.rejections import Claim, keeps_shape, rejections_of, replaces
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, special_case
+from rhythmid.diagnose.rejections import AT_END, SHAPES, Claim, keeps_shape, rejections_of, replaces
 from rhythmid.diagnose.shape import within_bounds
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
@@ -125,6 +124,8 @@ def search_effort(
         if better is None:
             break
         chosen = better
+    for beside in search.at_end:  # after the steps, of which each fits only what is not known
+        search.in_parts(*beside)
     made = search.predicted(search.found)
     best = search.found[max(range(len(made)), key=lambda index: made[index].score)]
     for one in (chosen, best) if best is not chosen else (chosen,):
@@ -149,6 +150,7 @@ class _Search:
     recorded: Array | None = None  # at their own stamps
     tried: set[str] = field(default_factory=set)
     ruled_out: list[Fitted] = field(default_factory=list)
+    at_end: list[tuple[Fitted, Element]] = field(default_factory=list)  # with what such a law was added to
     cut: dict[str, str] = field(default_factory=dict)  # not tried for lack of time
 
     @property
@@ -186,6 +188,8 @@ class _Search:
                 if fitted is None or self._known(fitted):
                     continue
                 (new if keeps_shape(fitted.shape) else self.ruled_out).append(fitted)
+                if one.start.element is not None and fitted.shape[AT_END] < SHAPES[AT_END]:
+                    self.at_end.append((base, one.start.element))
         if not new:
             return None
         new = self._nearer(new)
@@ -221,7 +225,7 @@ class _Search:
             if model is not None and not time_is_up():
                 aligned = self._aligned(plain.elements)
                 fit = self._fit(plain.elements, model, plain.priors, aligned, best.fit.alignment)
-                made = replace(fit, shape=_worst(plain.shape, fit.shape))
+                made = replace(fit, shape=worst(plain.shape, fit.shape))
                 again = self.predicted([*new, made])[-1]
                 found[place] = made if again.score > scores[place] else plain
         return found
@@ -274,7 +278,7 @@ class _Search:
         for one in rest:  # with fewer effects its shape statistics may change
             term = made.fit.model.term(one)
             if term is not None:
-                shape = _worst(shape, self._shape(made, self.without(made, one), one, term.element))
+                shape = worst(shape, self._shape(made, self.without(made, one), one, term.element))
         return replace(made, shape=shape)
 
     def reduce(self, fitted: Fitted) -> None:
@@ -291,6 +295,17 @@ class _Search:
             term = fitted.fit.model.term(label)
             if term is not None:
                 self._simplify(base, term.element)
+
+    def in_parts(self, base: Fitted, law: Element) -> None:
+        """Fit the base with the effects that together are a law at the end of its range."""
+        made: Fitted | None = base
+        for name in law.beyond:
+            if made is not None and all(name != t.element.name for t in made.fit.model.terms):
+                model = made.fit.model
+                starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
+                screened = screen(self.balance, made.fit, [one for one in starts if one.name == name])
+                made = self.fitted(made, screened[0]) if screened else None
+        self._keep(made or base)
 
     def _keep(self, fitted: Fitted) -> None:
         if not self._known(fitted):
@@ -326,7 +341,7 @@ class _Search:
             return None
         made = self._fit((*base.elements, label), model, priors, aligned, alignment)
         own = self._shape(made, base, label, start.element) if start.element else {}
-        return replace(made, shape=_worst(base.shape, made.shape, own))
+        return replace(made, shape=worst(base.shape, made.shape, own))
 
     def _shape(self, made: Fitted, base: Fitted, label: str, element: Element) -> dict[str, float]:
         """Statistics of an effect by the name of the rule that uses them; `base` is the hypothesis without it."""
@@ -369,7 +384,7 @@ class _Search:
         self, elements: tuple[str, ...], model: Model, priors: dict[str, Prior], aligned: Alignment, at: float
     ) -> Fitted:
         fit = fit_effort(self.balance, model, [n for n in model.free if n in priors], priors, aligned, at)
-        made = Fitted.of(elements, _kind_of(elements, model), fit, priors, self.balance)
+        made = Fitted.of(elements, kind_of(elements, model), fit, priors, self.balance)
         sizes = scales_of(self.balance, model)
         terms = [term for label in elements if (term := fit.model.term(label)) is not None]
         ends = [within_bounds(term, sizes) for term in terms]
@@ -382,17 +397,3 @@ class _Search:
 
     def _known(self, fitted: Fitted) -> bool:
         return any(one.key == fitted.key for one in self.found)
-
-
-def _worst(*shapes: Mapping[str, float]) -> dict[str, float]:
-    """The smallest value of each statistic."""
-    return {name: min(one[name] for one in shapes if name in one) for name in dict.fromkeys(chain(*shapes))}
-
-
-def _kind_of(elements: Sequence[str], model: Model) -> Kind:
-    """The kind of hypothesis that these additions to the nominal model make."""
-    if not elements:
-        return "nominal"
-    if INPUT_DELAY in elements:
-        return "delay"
-    return "effects" if all(model.term(label) is not None for label in elements) else "freed_value"

@@ -11,18 +11,20 @@ from rhythmid.diagnose.family import MissingFamily
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.identify.joints.reference_delay import ReferenceDelay
 
+BASE = "base"  # the place of what is wrong with the machine as a whole
+
 
 @dataclass(frozen=True)
 class JointEffect:
-    """An effect that the nominal model lacks at a joint.
+    """An effect that the nominal model lacks at a joint, or `base_tilt`, which belongs to no joint.
 
     For a link's mass, inertia, centre of mass or payload, `link` names the link, and the joint is the one that moves it. `share` is relative to
     the joint's mismatch. `heldout_gain` is the reduction of the joint's error on data that no fit has seen, as a share of the
     effort. `together` is the probability that the effect, or one of those listed in its place, is missing. `other_links` are further links, whose
-    masses the records do not separate from that of `link`.
+    masses the records do not separate from that of `link`. For `base_tilt` share and gain are those of the joint that shows it best.
     """
 
-    joint: str
+    joint: str | None
     element: str
     slot: str
     equation: str
@@ -33,6 +35,11 @@ class JointEffect:
     link: str | None = None
     together: float = 0.0
     other_links: tuple[str, ...] = ()
+
+    @property
+    def place(self) -> str:
+        """The joint, or the base."""
+        return self.joint or BASE
 
     @property
     def of_link(self) -> str:

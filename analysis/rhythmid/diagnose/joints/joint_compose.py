@@ -10,6 +10,7 @@ from rhythmid.diagnose.answer.compose_effort import FIXED_SCALE
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
 from rhythmid.diagnose.constants import BLIND, STATED
 from rhythmid.diagnose.hypothesis import Verdict
+from rhythmid.diagnose.joints.base_tilt import BaseTilt
 from rhythmid.diagnose.joints.equivalents import probability_together, shared_among
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import OF_LINKS, JointResult, name_of
@@ -29,6 +30,7 @@ EQUATIONS = {  # for quantities that are not elements: slot, meaning, and the na
     "link_centre_of_mass": ("body", "c → c′, mass and inertia about the centre kept", "x, y, z"),
     "link_mass_and_centre": ("body", "m, c, I → m′, c′, I′", "mass, x, y, z"),
     "payload": ("body", "point mass m at the end of the link", "mass"),
+    "base_tilt": ("body", "g → g′, its size kept", "angle, x, y, z"),
     "actuator_delay": ("actuator", "f(t) → f(t − τ)", "delay"),
     "input_delay": ("command", "r(t) → r(t − τ)", "delay"),
 }
@@ -47,8 +49,9 @@ def compose_machine(
     refused: Mapping[str, str],
     notes: Sequence[str] = (),
     delay: ReferenceDelay | None = None,
+    tilt: BaseTilt | None = None,
 ) -> MachineDiagnosis:
-    """The diagnosis; `links` are the corrected masses, inertias or payloads, `stated` the labels stated at each joint."""
+    """The diagnosis; `links` are the corrected masses, inertias or payloads, `tilt` that of the base, `stated` the labels stated at each joint."""
     missing = [
         _effect(found[joint], answers[joint], label)
         for joint, labels in stated.items()
@@ -56,10 +59,12 @@ def compose_machine(
         if label.removeprefix(f"{BODY}.") not in links
     ]
     missing += [_link(machine, one, _of_same_link(one, links)) for one in links.values()]
+    if tilt is not None:
+        missing.append(_of_base(tilt, answers[tilt.shown]))
     of_links = _quantities_of(links)
     holding = [one for one in missing if _holds(one, answers, of_links)]
     missing.sort(key=lambda one: (one not in holding, -one.heldout_gain))
-    named = {one.joint for one in missing}
+    named = {one.joint for one in missing if one.joint is not None}
     unknown = tuple(j for j, one in answers.items() if one.verdict == "unknown_physics")
     sure = {one.joint for one in holding}
     undecided = tuple(
@@ -76,7 +81,7 @@ def compose_machine(
         verdict = "undecided"
     return MachineDiagnosis(
         verdict=verdict,
-        summary=summary_of_joints(missing, unknown, undecided, answers, of_links),
+        summary=summary_of_joints(missing, unknown, undecided, answers, of_links, tilt),
         location=_location(missing, unknown, undecided),
         missing=tuple(missing),
         unknown=unknown,
@@ -175,6 +180,23 @@ def _link(machine: Machine, wrong: WrongLink, same: Sequence[WrongLink]) -> Join
     )  # fmt: skip
 
 
+def _of_base(tilt: BaseTilt, shown: Diagnosis) -> JointEffect:
+    """The tilt of the base, with what it explains of the joint that shows it best."""
+    slot, equation, _ = EQUATIONS["base_tilt"]
+    before, after = (error_of(shown.fit[name]) for name in ("refitted_nominal", "augmented"))
+    share = 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
+    return JointEffect(
+        None,
+        "base_tilt",
+        slot,
+        equation,
+        max(share, 0.0),
+        tilt.probability,
+        tilt.values,
+        max(before - after, 0.0),
+    )
+
+
 def _quantities_of(links: Mapping[str, WrongLink]) -> dict[str, tuple[str, ...]]:
     """For each wrong link its quantities that may be the wrong ones: the corrected ones, and those that explain the records as well."""
     names: dict[str, dict[str, None]] = {}
@@ -190,6 +212,7 @@ def summary_of_joints(
     undecided: Sequence[str],
     answers: Mapping[str, Diagnosis],
     of_links: Mapping[str, Sequence[str]],
+    tilt: BaseTilt | None = None,
 ) -> str:
     """Summary of the joints at which something is wrong; `of_links` are the quantities of each wrong link that may be the wrong ones.
 
@@ -197,7 +220,7 @@ def summary_of_joints(
     """
     said, doubted, told = [], [], set[str]()
     for one in missing:
-        if one.link and one.link in told:
+        if one.joint is None or (one.link and one.link in told):
             continue
         others = [] if one.probability >= STATED else _in_its_place(one, answers, of_links)
         what = " or ".join([_in_words(one), *others])
@@ -207,7 +230,8 @@ def summary_of_joints(
             continue
         told |= {one.link} if one.link else set()
         said.append(f"{one.joint}: {what}")
-    words = f"The model is wrong at {'; '.join(said)}." if said else ""
+    words = "" if tilt is None else f"{tilt.words[0].upper()}{tilt.words[1:]}."
+    words += f" The model is wrong at {'; '.join(said)}." if said else ""
     words += f" In doubt: {'; '.join(doubted)}." if doubted else ""
     for why, joints in _alike(unknown, answers).items():
         words += f" At {', '.join(joints)} {why[0].lower()}{why[1:]}"
@@ -224,13 +248,16 @@ def _holds(one: JointEffect, answers: Mapping[str, Diagnosis], of_links: Mapping
     """Whether an effect is sure enough for the headline: by itself, or with those that are listed in its place.
 
     If the joint's own answer is undecided, what was fitted there has to explain the effort as an identified model does: what leaves more of it
-    may be the best of several wrong explanations.
+    may be the best of several wrong explanations. A sure part of an explanation that is not sure as a whole remains in doubt.
     """
-    answer = answers.get(one.joint)
+    answer = None if one.joint is None else answers.get(one.joint)
     same = of_links.get(one.link, ()) if one.link else ()
     if max(one.probability * max(len(same), 1), one.together) < STATED:
         return False
-    return answer is None or answer.verdict == "missing_physics" or error_of(answer.fit["augmented"]) < BLIND
+    if answer is None or answer.verdict == "missing_physics":
+        return True
+    part = one.link is None and answer.joint_probability < STATED <= one.probability
+    return not part and error_of(answer.fit["augmented"]) < BLIND
 
 
 def _in_its_place(
@@ -241,7 +268,7 @@ def _in_its_place(
     same = of_links.get(one.link, ()) if one.link else ()
     sure = one.probability * len(same) >= STATED
     values = [_in_words(replace(one, element=name)) for name in same if sure and name != one.element]
-    known = answers[one.joint].indistinguishable if one.joint in answers else ()
+    known = answers[one.joint].indistinguishable if one.joint is not None and one.joint in answers else ()
     groups = [group for group in known if one.element in group]
     return values + [in_words(name) for group in groups for name in group if name != one.element]
 
@@ -259,6 +286,8 @@ def _location(
 ) -> JointLocation:
     if missing:
         first = missing[0]
+        if first.joint is None:
+            return JointLocation(None, first.slot, "in the mounting of the base")
         where = SENTENCES.get(first.slot, "in the inertia of the body")
         return JointLocation(first.joint, first.slot, f"at joint {first.joint}, {where}")
     if unknown:

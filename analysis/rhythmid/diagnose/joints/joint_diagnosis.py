@@ -5,7 +5,6 @@ rate accounts for the candidates of all joints. A link with a wrong mass or iner
 carries it. If one is found, it is corrected, and the joints that feel it are searched again.
 """
 
-import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +18,8 @@ from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.case import EXPLAINED, SEARCHED, WEIGHED, Budget
 from rhythmid.diagnose.constants import STATED
-from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.joints.augmented import augmented
+from rhythmid.diagnose.joints.base_tilt import BaseTilt, likely_tilt
 from rhythmid.diagnose.joints.contradiction import Searched, contradicted
 from rhythmid.diagnose.joints.equivalents import equivalent_names, equivalents
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
@@ -27,7 +27,6 @@ from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, nam
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.link_centre import feels
 from rhythmid.diagnose.joints.misfit import braking, misfits
-from rhythmid.diagnose.joints.stated_fit import stated_fit
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
@@ -36,7 +35,7 @@ from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_plausibility import check_joints
 from rhythmid.identify.joints.reference_delay import ReferenceDelay, reference_delay
 from rhythmid.identify.joints.reference_lead import told_of
-from rhythmid.model import INERTIA, Model
+from rhythmid.model import INERTIA
 from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
@@ -60,11 +59,12 @@ MATTERS = 0.02  # smallest change of a mass or an inertia that an effort balance
 
 @dataclass(frozen=True)
 class MachineAnswer(Result):
-    """A diagnosis, the augmented machine, and the result at each joint."""
+    """A diagnosis, the augmented machine, and the result at each joint, also `given` the body as the model has it."""
 
     diagnosis: MachineDiagnosis
     machine: Machine
     results: Mapping[str, JointResult]
+    given: Mapping[str, JointResult]
 
     @property
     def headline(self) -> str:
@@ -88,7 +88,7 @@ class MachineAnswer(Result):
             for joint, one in self.diagnosis.joints.items()
         ]
         missing = [
-            {"joint": one.joint, "element": one.element, "probability": one.probability, "share": one.share}
+            {"joint": one.place, "element": one.element, "probability": one.probability, "share": one.share}
             for one in self.diagnosis.missing
         ]
         return {"joints": joints, "missing": missing}
@@ -130,7 +130,7 @@ def diagnose_machine(
             f"{', '.join(j for j, one in best.refused.items() if one == each)}: {each}" for each in reasons
         ]
         raise InputError(f"no joint can be judged: {'; '.join(why)}")
-    answers = {joint: _answer(one) for joint, one in best.found.items()}
+    answers = {joint: _answer(one, best.given.get(joint, one)) for joint, one in best.found.items()}
     told = () if records[0].sampled else tuple(told_of(best.leads))
     put_right = (one.beside(machine) for one in best.links.values())
     late = () if best.delay is None else (best.delay.told,)
@@ -144,16 +144,19 @@ def diagnose_machine(
         *misfits(answers, braking(best.found, machine)),
     )
     diagnosis = compose_machine(
-        machine, best.found, answers, best.stated, best.links, best.refused, notes, best.delay
+        machine, best.found, answers, best.stated, best.links, best.refused, notes, best.delay, best.tilt
     )
-    return MachineAnswer(diagnosis, _augmented(best), best.found)
+    return MachineAnswer(
+        diagnosis, augmented(best.machine, best.found, best.stated, best.links), best.found, best.given
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class _Explained:
     """The results of all joints.
 
-    `machine` has the corrected parameters of links; the `leads` [s] and the `delay` of references were taken into account.
+    `machine` has the corrected parameters of links and the `tilt` of the base; the `leads` [s] and the `delay` of references were taken into
+    account. `given` are the results with the body as it is given.
     """
 
     machine: Machine
@@ -162,6 +165,8 @@ class _Explained:
     links: Mapping[str, WrongLink]
     leads: Mapping[str, float]
     delay: ReferenceDelay | None
+    tilt: BaseTilt | None
+    given: Mapping[str, JointResult]
 
     @property
     def stated(self) -> dict[str, tuple[str, ...]]:
@@ -177,7 +182,8 @@ class _Explained:
             for joint, one in self.found.items()
             if one.result.decision.verdict != "consistent" and not stated[joint] and _different(one)
         ]
-        return len(self.links) + sum(map(len, stated.values())) + len(open_)
+        shared = len(self.links) + (self.tilt is not None)
+        return shared + sum(map(len, stated.values())) + len(open_)
 
 
 def _explained(
@@ -193,9 +199,21 @@ def _explained(
     delay = reference_delay(balances, balances.computed) if balances.computed else None
     joints = [joint for joint in machine.joints if joint not in unsigned]
     found, refused = _searched(balances, unseen, joints, catalogue, tell, budget, delay, SEARCHED)
-    refused = {**unsigned, **refused}
+    refused, given = {**unsigned, **refused}, found
     most = max(MOST_LINKS, len(machine.body.links))
+    tilt: BaseTilt | None = None
+    weighed: Machine | None = None  # the machine whose mounting has been compared with the laws of its joints
     while len(links) < most and len(balances.refuted) < most and budget.allows(correction, WEIGHED):
+        if tilt is None and weighed is not machine:
+            weighed, tilt = machine, likely_tilt(balances, records, found)
+            if tilt is not None:
+                tell(tilt.words)
+                machine = machine.with_gravity(tilt.gravity)
+                balances = JointBalances.of(machine, records, balances)
+                unseen = JointBalances.of(machine, holdout, balances) if holdout else None
+                delay = reference_delay(balances, balances.computed) if balances.computed else None
+                better, refused_now = _searched(balances, unseen, list(found), catalogue, tell, budget, delay)
+                found, refused = {**found, **better}, {**refused, **refused_now}
         best = _heaviest(found, set(links))
         if best is None:
             break
@@ -228,7 +246,7 @@ def _explained(
             links[wrong.parameter] = wrong
             machine, balances, delay, unseen = tried, changed, late, seen
         found, refused = {**found, **better}, {**refused, **refused_now}
-    return _Explained(machine, found, refused, links, balances.leads, delay)
+    return _Explained(machine, found, refused, links, balances.leads, delay, tilt, given)
 
 
 def _searched(
@@ -261,11 +279,13 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
     alike = _held_by_alike(one) >= STATED
     if alike and chosen.kind == "effects" and decision.verdict == "undecided":
         return chosen.elements
-    if chosen.kind not in ("freed_value", "delay") or not (alike or decision.joint >= STATED):
+    if chosen.kind not in ("freed_value", "delay"):
         return ()
     known = all(label == INERTIA or name_of(one.joint, label)[0] != label for label in own)
     if not known:  # a wrong value of the path itself is left to the model's author
         return ()
+    if not (alike or decision.joint >= STATED):
+        return decision.agreed  # the effects that the evidence has beside any value
     named = tuple(label for label in decision.named if _differs(one, label))
     return named if alike else tuple(label for label in named if decision.probability[label] >= STATED)
 
@@ -337,53 +357,10 @@ def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, J
     return None if best is None else best[1:]
 
 
-def _answer(one: JointResult) -> Diagnosis:
-    return replace(compose_effort(one.case, one.result, ()), indistinguishable=equivalent_names(one))
-
-
-def _augmented(best: _Explained) -> Machine:
-    """The machine with the fitted paths and the stated effects; corrected masses keep the values of the answer."""
-    machine, stated = best.machine, best.stated
-    inertial: dict[str, float] = {}
-    spreads: dict[str, float] = {}
-    for joint, one in best.found.items():
-        fitted = stated_fit(one.result, stated[joint])
-        path = machine.paths[joint]
-        adopted = {
-            *stated[joint],
-            *one.result.nominal.fit.names,
-        }  # without values that were freed but are not stated
-        if INERTIA in adopted:
-            rotor = fitted.model.mass.value - path.mass.value
-            before = machine.body.parameters[f"{joint}.armature"]
-            inertial[f"{joint}.armature"] = max(before + rotor, 0.0)
-        for (
-            label,
-            std,
-        ) in (
-            fitted.std().items()
-        ):  # a free mass takes the value of the joint with the smallest standard deviation
-            link = label.removeprefix(f"{BODY}.")
-            free = label.startswith(f"{BODY}.") and label in adopted and link not in best.links
-            if free and std < spreads.get(link, math.inf):
-                inertial[link], spreads[link] = fitted.model.value(label), std
-        machine = machine.with_path(joint, _without_body(_with_delay(one, fitted), path))
-    return machine.with_inertial(inertial) if inertial else machine
-
-
-def _with_delay(one: JointResult, fitted: Fitted) -> Model:
-    """A joint's fitted path; if it has a delay and the effort was computed from the reference, with the reference's whole delay."""
-    model = fitted.model
-    if not one.by_reference or INPUT_DELAY not in model.parameters or model.parameters[INPUT_DELAY].fixed:
-        return model
-    late = model.value(INPUT_DELAY) + one.late + fitted.fit.alignment
-    return model.with_values({INPUT_DELAY: max(late, 0.0)})
-
-
-def _without_body(model: Model, path: Model) -> Model:
-    """A joint's fitted path without the term for the body and with its own inertia."""
-    kept = tuple(term for term in model.terms if term.label != BODY)
-    behind = tuple(
-        t for t in path.terms if t.label not in {term.label for term in kept}
-    )  # elements behind the measured effort
-    return replace(model, mass=path.mass, terms=(*kept, *behind))
+def _answer(one: JointResult, given: JointResult) -> Diagnosis:
+    """The answer at a joint; its nominal error is that with the body as it is `given`, before any of its values was corrected."""
+    made = compose_effort(one.case, one.result, ())
+    if given is not one:
+        nominal = compose_effort(given.case, given.result, ()).fit["refitted_nominal"]
+        made = replace(made, fit={**made.fit, "refitted_nominal": nominal})
+    return replace(made, indistinguishable=equivalent_names(one))

@@ -1,13 +1,10 @@
 """Report of a diagnosis of several joints."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from rhythmid.body.machine import Machine
 from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.body.robot_tree import parents_of
-from rhythmid.diagnose.joints.joint_case import JointResult
 from rhythmid.diagnose.joints.joint_diagnosis import MachineAnswer
 from rhythmid.report.joints import JointCurves, joints_page
 from rhythmid.report.page import Page
@@ -19,13 +16,15 @@ def present_machine(answer: MachineAnswer, nominal: Machine, source: str, comman
     """The page of an answer; `source` names the model and the records, `command` is the command line."""
     result = answer.diagnosis.to_dict()
     models = {"Nominal machine": nominal.to_yaml(), "Augmented machine": answer.machine.to_yaml()}
-    return joints_page(result, source, _robot(answer, nominal.body), _curves(answer.results, nominal), command, models)  # fmt: skip
+    return joints_page(result, source, _robot(answer, nominal.body), _curves(answer, nominal), command, models)  # fmt: skip
 
 
 def _robot(answer: MachineAnswer, body: MujocoBody) -> list[DrawnJoint]:
     found = answer.diagnosis
     faults: dict[str, str] = {}
     for one in found.missing:
+        if one.joint is None:
+            continue
         name = one.of_link or pretty_name(one.element)
         faults[one.joint] = f"{faults[one.joint]}, {name}" if one.joint in faults else name
     unnamed = {**dict.fromkeys(found.undecided, "undecided"), **dict.fromkeys(found.unknown, "unknown")}
@@ -42,14 +41,15 @@ def _robot(answer: MachineAnswer, body: MujocoBody) -> list[DrawnJoint]:
     ]
 
 
-def _curves(results: Mapping[str, JointResult], machine: Machine) -> dict[str, JointCurves]:
+def _curves(answer: MachineAnswer, machine: Machine) -> dict[str, JointCurves]:
     found = {}
-    for joint, one in results.items():
+    for joint, one in answer.results.items():
+        before = answer.given.get(joint, one)
         balance = one.result.search.balance
         first = len(balance.places[0])  # number of rows of the first motion
         time = balance.motions[0].time[np.asarray(balance.places[0], dtype=int)]
         measured = balance.measured[:first]
-        nominal, augmented = (fit.fit.residual[:first] for fit in (one.result.nominal, one.result.chosen))
+        nominal, augmented = (fit.fit.residual[:first] for fit in (before.result.nominal, one.result.chosen))
         unit = "N*m" if machine.body.joints[joint].rotational else "N"
         found[joint] = JointCurves(time, measured, measured + nominal, measured + augmented, unit)
     return found

@@ -149,7 +149,7 @@ def _fitted(
         now = JointBalances.of(made, records, balances)
     hinge = machine.body.hinges.get(link)
     origin = np.zeros(3) if hinge is None else hinge.place
-    return Load(ten, covariance, own, origin, weight_of_values(found, corrected, now, joints))
+    return Load(ten, covariance, own, origin, weight_of_values(found, corrected, now, joints, link))
 
 
 def _centre(rows: Sequence[tuple[Array, Array]], own: Principal, start: Array) -> tuple[Array, Array]:

@@ -7,6 +7,9 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rhythmid.body.body import BODY
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS
@@ -20,7 +23,10 @@ from rhythmid.identify.inverse_dynamics.estimate import fit_effort, linearise
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.robust_covariance import with_robust_std
 from rhythmid.model import Model
+from rhythmid.simulation.transport import INPUT_DELAY
 from rhythmid.value import Prior
+
+Array = NDArray[np.float64]
 
 
 def own_path(balances: JointBalances, one: JointResult) -> Model:
@@ -104,7 +110,7 @@ def weight_of_joints(
             sides = before[joint], after[joint]
             hypotheses = [fit for one in sides for fit in (one.result.nominal, _of_effects(one))]
             at = [(one.case.nominal, one.result.search.balance) for one in sides]
-            total += _gain(before[joint], hypotheses, *at)
+            total += gain_of(before[joint], hypotheses, *at)
     return total
 
 
@@ -117,23 +123,51 @@ def _of_effects(one: JointResult) -> Fitted:
     return max(found, key=lambda fit: score[fit.elements])
 
 
+def _of_own_link(one: JointResult, link: str, balances: JointBalances) -> list[Fitted]:
+    """The hypotheses of a joint that free one value of the link that it turns; none where this is the `link` itself."""
+    body = balances.machine.body
+    own = tuple(f"{BODY}.{name}." for name in body.links if name != link and body.joint_of(name) == one.joint)
+    return [
+        fit
+        for fit in one.result.search.hypotheses
+        if len(fit.elements) == 1 and fit.elements[0].startswith(own)
+    ]
+
+
 def weight_of_values(
-    found: Mapping[str, JointResult], before: JointBalances, after: JointBalances, joints: Collection[str]
-) -> float:
-    """Log odds that these joints together give the values of the body `after` against those `before`, with the effects found at them."""
+    found: Mapping[str, JointResult], before: JointBalances, after: JointBalances, joints: Collection[str], link: str | None = None,
+) -> float:  # fmt: skip
+    """Log odds that these joints together give the values of the body `after` against those `before`, with the effects found at them.
+
+    Where the values are those of one `link`, a joint that needs another value of the link that it turns, whichever of the two is right, has it:
+    what is left of its effort only until its own link is corrected is no evidence for the link that is carried.
+    """
     total = 0.0
     for joint in joints:
         one = found[joint]
-        hypotheses = [one.result.nominal, _of_effects(one)]
-        total += _gain(
-            one,
-            hypotheses,
-            *((side.models[joint], side.balance(joint, one.late)) for side in (before, after)),
-        )
+        sides = [(side.models[joint], side.balance(joint, one.late)) for side in (before, after)]
+        plain = [one.result.nominal, _of_effects(one)]
+        own = [] if link is None else _of_own_link(one, link, before)
+        scores = _net_scores(one, [*plain, *own], sides) if own else None
+        if scores is not None and (scores.argmax(axis=1) >= len(plain)).all():
+            total += float(scores[1].max() - scores[0].max())
+        else:
+            total += gain_of(one, plain, *sides)
     return total
 
 
-def _gain(
+def parts_of(one: JointResult) -> list[Fitted]:
+    """The hypotheses of a joint that a cause beside it may leave: those whose effects are part of the chosen ones or of the best ones without a
+    value of the body, the nominal path among them. A longer delay is no such effect."""
+    wholes = [set(one.result.chosen.elements), set(_of_effects(one).elements)]
+    return [
+        fit
+        for fit in one.result.search.hypotheses
+        if INPUT_DELAY not in fit.elements and any(set(fit.elements) <= whole for whole in wholes)
+    ]
+
+
+def gain_of(
     one: JointResult,
     hypotheses: Sequence[Fitted],
     before: tuple[Model, Balance],
@@ -144,17 +178,22 @@ def _gain(
     Each side has the best of these hypotheses, of which an effect costs what any addition has to gain in a search: a value of a link
     that needs another effect at a joint beside it explains less than one that needs none.
     """
-    fits = [_moved(fitted, *side).linearised for side in (before, after) for fitted in hypotheses]
+    scores = _net_scores(one, hypotheses, (before, after))
+    return 0.0 if scores is None else float(scores[1].max() - scores[0].max())
+
+
+def _net_scores(
+    one: JointResult, hypotheses: Sequence[Fitted], sides: Sequence[tuple[Model, Balance]]
+) -> Array | None:
+    """Log scores (sides, hypotheses) less the price of the effects; None where the sides do not have the same rows."""
+    fits = [_moved(fitted, *side).linearised for side in sides for fitted in hypotheses]
     if len({len(fit.residual) for fit in fits}) > 1:
-        return 0.0
+        return None
     price = decisive(one.result.contest.candidates)
     search = one.result.search
     scores = [each.score for each in predict(fits, search.blocks, search.balance.record)]
-    net = [
-        score - price * len(fitted.elements)
-        for score, fitted in zip(scores, [*hypotheses, *hypotheses], strict=True)
-    ]
-    return max(net[len(hypotheses) :]) - max(net[: len(hypotheses)])
+    prices = [price * len(fitted.elements) for fitted in hypotheses]
+    return np.reshape(scores, (len(sides), len(hypotheses))) - np.array(prices)
 
 
 def _moved(fitted: Fitted, nominal: Model, balance: Balance) -> Fitted:

@@ -115,12 +115,23 @@ def weighted_rows(
     fit = fit_effort(balance, model)
     made = [body.inertial_columns(link, b.pose, b.rate, b.acceleration)[:, own] for b in balances.bodies]
     columns = balance.rows(made, balance.later(fit.model, fit.alignment))
-    scale = scale_of(fit.residual)
-    lasts = autocorrelation_time(fit.residual, balance.record)
-    root = np.sqrt(weights_of(fit.residual, scale) / lasts) / scale
-    basis = orthonormal(fit.jacobian * root[:, None])
+    return in_units_of_noise(fit.residual, columns, fit.jacobian, balance.record)
+
+
+def in_units_of_noise(
+    residual: Array, columns: Array, beside: Array, record: NDArray[np.int64], noise: Array | None = None
+) -> tuple[Array, Array]:
+    """A residual (n,) and columns (n, k) in units of the noise, with the columns `beside` (n, p) of other parameters projected out.
+
+    The `noise` (n,) is the residual itself unless that of a better model is given; `record` (n,) is the record of each row.
+    """
+    noise = residual if noise is None else noise
+    scale = scale_of(noise)
+    lasts = autocorrelation_time(noise, record)
+    root = np.sqrt(weights_of(noise, scale) / lasts) / scale
+    basis = orthonormal(beside * root[:, None])
 
     def without(signal: Array) -> Array:
         return signal - basis @ (basis.T @ signal)
 
-    return without(root * fit.residual), without(root[:, None] * columns)
+    return without(root * residual), without(root[:, None] * columns)

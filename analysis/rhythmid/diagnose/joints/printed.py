@@ -16,7 +16,7 @@ def show_diagnosis(found: MachineDiagnosis, console: Console) -> None:
     for one in found.missing:
         what = one.of_link or one.element
         console.print(
-            f"[bold]{escape(one.joint)}: {escape(what)}[/]   {escape(one.equation)}   (probability {one.probability:.2f}, "
+            f"[bold]{escape(one.place)}: {escape(what)}[/]   {escape(one.equation)}   (probability {one.probability:.2f}, "
             f"{written_percent(one.share)} of the joint's mismatch)"
         )
         for name, value in one.parameters.items():

@@ -9,7 +9,7 @@ import math
 
 from rhythmid.elements.element import STEP, Element, Parameter
 
-# beyond, friction would push in one direction; at the limit a constant force is the likelier cause
+# beyond, friction would push in one direction: there a constant force acts beside a friction
 ONE_SIDED = (-1.0, 1.0)
 
 
@@ -39,6 +39,7 @@ ELEMENT = Element(
         {"force": 0.02 * s.force, "asymmetry": a, "transition": 0.1 * s.velocity} for a in (-0.5, 0.5)
     ],
     ranges=lambda s: {"transition": s.turning, "asymmetry": ONE_SIDED},
+    beyond=("constant_force", "coulomb_friction"),
     against="base",
     also_known_as=("direction-dependent dry friction",),
     family="friction",

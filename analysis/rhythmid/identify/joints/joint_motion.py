@@ -106,7 +106,7 @@ class JointBalances:
         """The balances of these records, with the filters of `alike` and without the same leads. Raises InputError
         where the records are too short.
 
-        The forces at each joint are those of `alike`, too, unless payloads or centres of mass are at other places.
+        The forces at each joint are those of `alike`, too, unless payloads or centres of mass are at other places, or gravity differs.
         """
         stretches = joint_stretches(machine, records)
         cut, dominant = (alike.cut, alike.dominant) if alike else _cut(machine, stretches)
@@ -272,13 +272,13 @@ def _body_motion(machine: Machine, stretch: JointStretch, cut: float) -> BodyMot
 
 
 def _same_places(one: Machine, other: Machine) -> bool:
-    """Whether the payloads and the centres of mass of two machines are at the same places of their links."""
+    """Whether the payloads and the centres of mass of two machines are at the same places of their links, under the same gravity."""
     places = (
         (one.body.ends, other.body.ends),
         (one.body.centres, other.body.centres),
         (one.body.replaced, other.body.replaced),
     )
-    return all(
+    return np.array_equal(one.body.gravity, other.body.gravity) and all(
         first.keys() == second.keys() and all(np.array_equal(first[link], second[link]) for link in first)
         for first, second in places
     )
