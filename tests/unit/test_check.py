@@ -60,7 +60,7 @@ def test_outliers_and_stuck_samples_are_told_with_number_and_reason(tmp_path, sp
     lines = "\n".join(report.lines())
     assert "stand far off their neighbours are left out, 3 of 4000, the first at t = 3.5 s" in lines
     assert "repeat the one before while the motion goes on are left out, 6 of 4000" in lines
-    assert "9 samples are left out" in lines and "flawless" not in lines
+    assert "9 of 4000 samples are left out" in lines and "flawless" not in lines
     assert [(one["reason"], one["count"], one["total"]) for one in report.to_dict()["left_out"]] == [
         ("outlier", 3, N), ("repeated", 6, N),
     ]  # fmt: skip
@@ -78,7 +78,7 @@ def test_what_check_tells_is_what_a_diagnosis_does(tmp_path, spoilt):
 def test_clipped_samples_are_told_to_be_left_out(tmp_path):
     noisy = Y + 1e-5 * np.random.default_rng(3).standard_normal(N)
     report = quality_report(table(tmp_path, U, np.minimum(noisy, 0.1)), tmp_path / "signals.yaml")
-    (left_out,) = report.left_out
+    (left_out,) = report.left_out["output"]
     assert left_out.reason == "clipped" and left_out.count > 100
     assert "are clipped at 0.1 m" in "\n".join(report.lines())
 

@@ -319,7 +319,7 @@ def test_the_effort_is_scored_where_no_window_serves_although_those_come_first(m
 
     found = diagnosed("undecided", kind="effort")
     effort = SimpleNamespace(
-        applies=True, free_run_means_something=True, effort_share=0.5, notes=(), band_left_out=False
+        applies=True, free_run_means_something=True, effort_share=0.5, notes=(), band_left_out=True
     )  # fmt: skip
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
     monkeypatch.setattr(module, "settle", lambda *given: fails() if given[-1] else iter([]))

@@ -345,7 +345,7 @@ def _answers(
     try:
         yield from by_motion(windows=True)
     except InputError as error:
-        if driven:
+        if not effort.band_left_out:
             raise
         failed = True
         untried.append(Untried(BY_MOTION, str(error)))

@@ -131,20 +131,16 @@ def _within(
 
 
 def restarted(
-    problem: Problem, model: Model, starts: Sequence[Array], residuals: Sequence[Array] | None
-) -> tuple[list[Array], list[Array] | None]:
+    problem: Problem, model: Model, starts: Sequence[Array], residuals: Sequence[Array]
+) -> tuple[list[Array], list[Array]]:
     """For each series the better of its start and the one that its first samples show, with the residuals.
 
     A start that was fitted beside another model may lie behind a switch of the new one, such as a touch-down, which no descent passes.
     """
     shown = first_guess(model, problem.run)
     others = problem.residuals(model, shown)
-    if others is None or residuals is None:
-        return (
-            (list(starts), None if residuals is None else list(residuals))
-            if others is None
-            else (shown, others)
-        )
+    if others is None:
+        return list(starts), list(residuals)
     both = [list(zip(starts, residuals, strict=True)), list(zip(shown, others, strict=True))]
     best = [
         min(two, key=lambda one: float(np.sum(problem.whitened(index, one[1]) ** 2)))
@@ -199,7 +195,7 @@ def descend(
     current: list[Array] = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]
     problem.learn_hidden(model, current)
     residuals = problem.residuals(model, current)
-    if starts is not None:
+    if starts is not None and residuals is not None:
         current, residuals = restarted(problem, model, current, residuals)
     cost = problem.cost(model, residuals, current)
     if residuals is None or not math.isfinite(cost):
@@ -272,6 +268,7 @@ def descend(
                 searched, moved = True, sought(problem, model, current, states, state_steps)
                 trial_residuals = problem.residuals(model, moved)
             else:
+                assert residuals is not None
                 moved, trial_residuals = restarted(problem, model, current, residuals)
             trial_cost = problem.cost(model, trial_residuals, moved)
             if trial_cost < cost - enough:

@@ -156,7 +156,7 @@ def _rivals(one: Trial, best: Trial, groups: Sequence[Sequence[str]]) -> bool:
     """Whether the records do not tell a trial from the best one: by the information criterion or by the evidence."""
     if len(one.added) == len(best.added) and one.bic() - best.bic() < RIVALS:
         return True
-    names, own = ({t.element(label).name for label in t.added} for t in (one, best))
+    names, own = (set(t.names) for t in (one, best))
     return names != own and any(names ^ own <= set(group) for group in groups)
 
 

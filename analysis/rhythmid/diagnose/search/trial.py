@@ -45,6 +45,12 @@ class Trial:
         """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461), plus the cost of free initial states."""
         return self.chi2 + self.free * math.log(max(self.samples, 2)) + self.start_cost
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the added elements; of a freed value its own."""
+        terms = ((label, self.model.term(label)) for label in self.added)
+        return tuple(label if term is None else term.element.name for label, term in terms)
+
     def element(self, label: str) -> Element:
         """The model's element with a label; KeyError if there is none."""
         term = self.model.term(label)
