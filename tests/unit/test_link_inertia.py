@@ -109,7 +109,7 @@ def test_an_inertia_is_in_the_files_that_are_written(tmp_path: Path, suffix: str
     np.testing.assert_allclose(again.inverse(*motion), machine.body.inverse(*motion), atol=1e-9)
 
 
-def named(answer: MachineAnswer) -> dict[str, tuple[str, str | None]]:
+def named(answer: MachineAnswer) -> dict[str | None, tuple[str, str | None]]:
     return {one.joint: (one.element, one.link) for one in answer.diagnosis.missing}
 
 

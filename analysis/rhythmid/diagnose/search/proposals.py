@@ -83,7 +83,8 @@ def from_given(
 
 def follows_all(fit: Fit) -> bool:
     """Whether the model follows the machine in every record."""
-    errors = [normalised_error(*zip(*some, strict=True)) for some in by_record(fit)]
+    found = by_record(fit)
+    errors = [normalised_error([left for left, _ in some], [one for _, one in some]) for some in found]
     return not any(error > FOLLOWS for error in errors)
 
 
