@@ -27,7 +27,7 @@ def delayed(late: float) -> Record:
 
 
 def fitted(balance: Balance, model: Model = NOMINAL, aligned: Alignment | None = None) -> Fitted:
-    return Fitted.of((), "nominal", fit_effort(balance, model, aligned=aligned), {})
+    return Fitted.of((), "nominal", fit_effort(balance, model, aligned=aligned), {}, balance)
 
 
 def test_a_delay_of_more_than_a_sample_is_told_and_saved():
