@@ -84,10 +84,8 @@ def run_graph(
     """
     require_new(report)
     experiment = load(path, out)
-    if isinstance(experiment, Experiment):
-        experiment = experiment.as_stated if "plant" in (replaced or ()) else experiment
-        for note in experiment.notes:
-            console.print(f"note: {escape(note)}")
+    if isinstance(experiment, Experiment) and "plant" in (replaced or ()):
+        experiment = experiment.as_stated
     folder = Path(tempfile.mkdtemp(prefix="rhythmid-"))
     with own_domain() as domain, interruptions() as interrupted:
         state.begun = True
@@ -105,6 +103,8 @@ def run_graph(
         return 0
     mend(experiment.record.path)
     show(console, experiment, supervisor.observed, outcome)
+    for note in experiment.notes if isinstance(experiment, Experiment) else ():
+        console.print(f"note: {escape(note)}")
     if report is not None:
         write_report(report, experiment.record.path, supervisor.observed, outcome)
         console.print(f"report: {report}")
