@@ -35,6 +35,7 @@ SHAKEN = {
 }
 SWUNG = {
     "duration": 20.0,
+    "forcing": {"amplitude": 1.0, "frequency": 1.0},
     "excitation": {"type": "chirp", "amplitude": 0.05, "sweep": 20.0, "band": [0.5, 2.0]},
     "noise": {"measurement_std": 1e-3},
 }
