@@ -182,7 +182,7 @@ def run(number: int, seed: int, bodies: Sequence[str], computed: bool = False) -
     share = 0.0 if effect == "none" else share_of(machine, plant, joint, effect, record, without)
     began = clock.process_time()
     answer = diagnose_machine([record], machine).diagnosis
-    named = tuple((one.joint, one.element) for one in answer.missing)
+    named = tuple((one.place, one.element) for one in answer.missing)
     here = [one for one in answer.missing if one.joint == joint]
     alike = {family(effect), effect}
     groups = [

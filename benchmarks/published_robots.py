@@ -183,7 +183,7 @@ def run(number: int, seed: int, robots: Mapping[str, Path]) -> Case:
         machine = Machine.load(Path(folder) / "model.yaml", catalogue)
         learn, judge = (load_joint_records([one], Path(folder) / "signals.yaml") for one in logs)
         answer = diagnose_machine(learn, machine, judge, catalogue).diagnosis
-    named = tuple((one.joint, one.element) for one in answer.missing)
+    named = tuple((one.place, one.element) for one in answer.missing)
     return Case(
         name, names[joint], effect, named, (*answer.unknown, *answer.undecided), model.njnt, clock.process_time() - began
     )  # fmt: skip
