@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhythmid.record.inventory import Recorded
-from rhythmid.start.meaning import Meaning, rotary_of
+from rhythmid.start.meaning import Meaning
 from rhythmid.start.relation import SURE, follows, predicts
+from rhythmid.start.rotary import rotary_of
 
 ONE_WAY = 4.0  # ratio of evidence that is needed for one direction over the other
 BEYOND_CHANCE = 3.0  # ratio to the largest evidence of shifted records

@@ -23,12 +23,11 @@ from rhythmid.start.meaning import (
     is_ignored,
     is_lone_v,
     meaning_of,
-    rotary_of,
-    rotary_of_wrench,
     says_who_asks,
 )
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along, runs_like_a_clock
 from rhythmid.start.role_choice import Ask, Choice, Known, pick, ranked_by_worth
+from rhythmid.start.rotary import rotary_of, rotary_of_wrench
 from rhythmid.start.slopes import without_slopes
 from rhythmid.start.step_before import BEFORE, duty_before, gone_to_set_point, set_point_before, step_before
 from rhythmid.start.symbols import with_symbols
