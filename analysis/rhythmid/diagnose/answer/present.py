@@ -1,13 +1,14 @@
 """Convert a diagnosis' answer into the plain data that its report draws."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
 from rhythmid.compare.compare import Comparison, run_of
+from rhythmid.diagnose.answer.compose import estimated
 from rhythmid.diagnose.answer.described import (
     given_values,
     hints_of,
@@ -239,14 +240,8 @@ def _transfer(
 
 
 def _estimates(fit: Fit) -> dict[str, dict[str, float | str | None]]:
-    """Every parameter of a fit; standard deviation 0 where it is fixed, None where the records do not determine it."""
-    std: Mapping[str, float] = fit.std
-    made: dict[str, dict[str, float | str | None]] = {}
-    for name, value in fit.model.parameters.items():
-        known = std.get(name, 0.0)
-        limit = 1e9 * max(abs(value.value), 1e-12)
-        made[name] = {"value": value.value, "std": known if known <= limit else None, "unit": value.unit}
-    return made
+    """Every parameter of a fit, as the answer states it."""
+    return {name: asdict(estimated(fit, name)) for name in fit.model.parameters}
 
 
 def _names(model: Model, labels: Sequence[str]) -> tuple[str, ...]:
