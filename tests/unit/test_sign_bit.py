@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tables import write_columns
 
 from rhythmid.errors import InputError
 from rhythmid.record.read import read_record
@@ -53,14 +54,7 @@ def written(path, resting: bool = True):
     }
     if resting:
         columns["pos (2)"] = end
-    np.savetxt(
-        path,
-        np.column_stack([TIME, *columns.values()]),
-        delimiter=",",
-        header=",".join(("time", *columns)),
-        comments="",
-    )
-    return path
+    return write_columns(path, {"time": TIME} | columns)
 
 
 def test_init_falls_on_the_joint_that_can_be_used_and_says_why_and_marks_sign_bits(tmp_path):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tables import write_columns
 
 from rhythmid.record.inventory import Recorded, inventory
 from rhythmid.start.meaning import derivative_of, is_ignored, meaning_of
@@ -50,14 +51,7 @@ def test_plain_names_state_no_derivative():
 
 
 def written(path, columns: dict[str, np.ndarray]):
-    np.savetxt(
-        path,
-        np.column_stack([TIME, *columns.values()]),
-        delimiter=",",
-        header=",".join(("time", *columns)),
-        comments="",
-    )
-    return inventory(path)
+    return inventory(write_columns(path, {"time": TIME} | columns))
 
 
 def trolley() -> tuple[np.ndarray, np.ndarray]:
