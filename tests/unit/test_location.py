@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.diagnose.contenders import Rows, linearised, rows_of
 from rhythmid.diagnose.evidence import cross_validate
-from rhythmid.diagnose.free_functions import free_maps, stretched
+from rhythmid.diagnose.free_functions import free_functions, stretched
 from rhythmid.diagnose.location import Dependence, beside, dependences, following, reach_of
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
 from rhythmid.identify.noise import NoiseModel
@@ -134,7 +134,7 @@ def test_a_free_map_is_one_more_hypothesis_on_the_same_rows():
     fit, rows = left.known.fit, left.rows
     reach = reach_of(fit, rows)
     base = following(linearised(fit, rows), rows, reach)
-    position = next(one for one in free_maps(left.known) if one.quantity == "position")
+    position = next(one for one in free_functions(left.known) if one.quantity == "position")
     wide, count = beside(fit, base, position, rows, reach), len(position.columns)
     assert wide.jacobian.shape == (len(base.residual), base.jacobian.shape[1] + count)
     np.testing.assert_array_equal(wide.residual, base.residual)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.free_functions import free_maps
+from rhythmid.diagnose.free_functions import free_functions
 from rhythmid.diagnose.search.response import response
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
 from rhythmid.diagnose.search.tangent import Tangent
@@ -141,4 +141,4 @@ def test_an_answer_whose_squares_would_overflow_is_none(swinging):
     stiff.__dict__["tangents"] = (Tangent(maps, 0.0),)
     assert 1e150 < np.abs(stiff.tangents[0].response(np.ones(count))).max() < np.inf
     assert response(stiff, 0, np.ones(count)) is None
-    assert not np.any(next(free_maps(stiff)).columns)
+    assert not np.any(next(free_functions(stiff)).columns)

@@ -39,7 +39,7 @@ SPLINED = {
 
 
 @dataclass(frozen=True)
-class FreeMap:
+class FreeFunction:
     """A free function: `columns[i][s]` (blocks,) is the change of series s's block averages per unit of coefficient i.
 
     `grid` (g,) and `basis` (i, g) draw a function of one quantity; both are empty for others.
@@ -133,7 +133,7 @@ def values_of(known: Trajectories, name: str) -> list[Array]:
     return [getattr(path, name) for path in known.legs]
 
 
-def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
+def free_functions(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeFunction]:
     """The free functions beside a fitted model, computed on demand because each is large for long records."""
     fit = known.fit
     yield from motion_maps(known, pool)
@@ -143,33 +143,33 @@ def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> It
     for name, values in quantities.items():
         functions, grid, basis = _splines(values, SPLINES)
         if functions:
-            yield FreeMap(name, _simulated(known, functions, pool), grid, basis)
+            yield FreeFunction(name, _simulated(known, functions, pool), grid, basis)
     both = [_splines(values_of(known, name), SPLINES_OF_TWO)[0] for name in ("position", "velocity")]
     if all(both):
         products = ([a * b for a, b in zip(x, v)] for x in both[0] for v in both[1])
-        yield FreeMap("position and velocity", _simulated(known, products, pool))
-    yield FreeMap("past position", _simulated(known, _slipped(values_of(known, "position")), pool))
+        yield FreeFunction("position and velocity", _simulated(known, products, pool))
+    yield FreeFunction("past position", _simulated(known, _slipped(values_of(known, "position")), pool))
     yield from filtered(known, pool)
     line = residual_line(fit)
     if line > 0.0:
         times = [p.time for p in known.paths]
         waves = [[wave(2.0 * np.pi * line * t) for t in times] for wave in (np.cos, np.sin)]
-        yield FreeMap(f"a vibration at {line:.3g} Hz", _simulated(known, waves, pool))
+        yield FreeFunction(f"a vibration at {line:.3g} Hz", _simulated(known, waves, pool))
     functions, grid, basis = _splines(values_of(known, "signal"), SPLINES)
     if functions:
         columns = tuple(tuple(s.of_block(f) for s, f in zip(fit.run.series, one)) for one in functions)
-        yield FreeMap("measured position (sensor error)", columns, grid, basis)
+        yield FreeFunction("measured position (sensor error)", columns, grid, basis)
 
 
-def motion_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
+def motion_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeFunction]:
     """Forces that are arbitrary functions of the position, and of the velocity."""
     for name in ("position", "velocity"):
         functions, grid, basis = _splines(values_of(known, name), SPLINES)
         if functions:
-            yield FreeMap(name, _simulated(known, functions, pool), grid, basis)
+            yield FreeFunction(name, _simulated(known, functions, pool), grid, basis)
 
 
-def filtered(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
+def filtered(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeFunction]:
     """Linear filters of the past velocity and of the past actuator force: a linear dynamic part that the model lacks."""
     times, frequency = [p.time for p in known.paths], _frequency(known)
     past = {"past velocity": values_of(known, "velocity")}
@@ -180,7 +180,7 @@ def filtered(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Ite
         functions = _remembered(values, times, frequency)
         if line > 0.0:
             functions += _resonant(values, times, line)
-        yield FreeMap(name, _simulated(known, functions, pool))
+        yield FreeFunction(name, _simulated(known, functions, pool))
 
 
 def _driven(known: Trajectories) -> bool:

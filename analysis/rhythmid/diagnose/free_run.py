@@ -38,6 +38,7 @@ from rhythmid.diagnose.search.round import distinct
 from rhythmid.diagnose.search.score_tests import (
     Trajectories,
     changes_of,
+    sizes_along,
     trajectories,
     under,
     whitened,
@@ -246,7 +247,8 @@ def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.floa
     """
     fit = found.fit
     made = np.zeros((len(fit.names), len(fit.names)))
-    lacking = candidates(catalogue, fit.model.setting, scales(fit.run.series, fit.model)).tried
+    run = trajectories(fit)
+    lacking = candidates(catalogue, fit.model.setting, sizes_along(run)).tried
     names = {element.name for element, _ in lacking}
     scored = distinct(found.rounds[-1].scores, len(catalogue)) if found.rounds else []
     tried = [(one.element, dict(one.values)) for one, _ in scored if one.element.name in names]
@@ -254,7 +256,7 @@ def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.floa
     known = np.isfinite(std) & (std > 0.0)
     if not known.any():
         return made
-    line, run = fit.linearisation, trajectories(fit)
+    line = fit.linearisation
     maps = [column for one in motion_maps(run, case.pool) for column in one.columns]
     # filled in place: for long records a second copy of all columns would be too large
     columns = np.empty((len(line.residual), len(tried) + len(maps)), order="F")

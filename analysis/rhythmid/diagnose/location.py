@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rhythmid.diagnose.contenders import Rows, linearised
 from rhythmid.diagnose.evidence import CrossValidated, Linearised, cross_validate
-from rhythmid.diagnose.free_functions import FreeMap, free_maps
+from rhythmid.diagnose.free_functions import FreeFunction, free_functions
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
 from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
@@ -113,7 +113,7 @@ def following(base: Linearised, rows: Rows, reach: Sequence[Reach]) -> Linearise
     return Linearised(base.residual, jacobian, base.precision, base.departure)
 
 
-def beside(fit: Fit, base: Linearised, one: FreeMap, rows: Rows, reach: Sequence[Reach]) -> Linearised:
+def beside(fit: Fit, base: Linearised, one: FreeFunction, rows: Rows, reach: Sequence[Reach]) -> Linearised:
     """The linearised fit, with its sensitivities of hidden rows, extended to first order by a free map."""
     known, count = base.jacobian.shape[1], len(one.columns)
     jacobian = np.zeros((len(base.residual), known + count))
@@ -150,7 +150,7 @@ def dependences(known: Trajectories, rows: Rows, pool: ThreadPoolExecutor | None
     n = len(alone.error)
 
     found: list[Dependence] = []
-    for one in free_maps(known, pool):
+    for one in free_functions(known, pool):
         give_back()
         wide, count = beside(fit, base, one, rows, reach), len(one.columns)
         quantity, grid, basis = one.quantity, one.grid, one.basis

@@ -20,7 +20,7 @@ from rhythmid.diagnose.baseline import Calibration
 from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.contenders import Rows, linearised, rows_of
 from rhythmid.diagnose.evidence import Linearised, predict, weight_for
-from rhythmid.diagnose.free_functions import FreeMap
+from rhythmid.diagnose.free_functions import FreeFunction
 from rhythmid.diagnose.location import Reach, beside, following, reach_of
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.diagnose.search.forward import search
@@ -65,7 +65,7 @@ class _Seen:
         columns = tuple(
             tuple(np.full(one.blocks, float(record_of(one) == name)) for one in series) for name in names
         )
-        return beside(self.fit, self.base, FreeMap("zero", columns), self.rows, self.reach)
+        return beside(self.fit, self.base, FreeFunction("zero", columns), self.rows, self.reach)
 
     def refitted(self, pool: ThreadPoolExecutor | None) -> Linearised | None:
         """The fit with a zero of each record, all parameters refitted; None where that fails.
