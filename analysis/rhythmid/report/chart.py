@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.report.quantity import number
+from rhythmid.report.quantity import number, scientific
 
 Array = NDArray[np.float64]
 WIDTH, HEIGHT = 400.0, 250.0  # small enough for readable text when a phone shrinks the drawing
@@ -221,11 +221,11 @@ def frame(x: Axis, y: Axis, x_label: str, y_label: str) -> list[str]:
 def _tick(value: float, axis: Axis) -> str:
     if abs(value) < 1e-9 * max(abs(axis.low), abs(axis.high)) and not axis.log:
         return "0"
-    return (
-        number(value, 3).replace(" × ", "·").removeprefix("1·")
-        if abs(value) >= 1e5 or abs(value) < 1e-3
-        else number(value, 5)
-    )
+    # all ticks of a logarithmic axis are written alike
+    low, high = (axis.low, axis.high) if axis.log else (abs(value), abs(value))
+    if high >= 1e5 or low < 1e-3:
+        return scientific(value, 3).replace(" × ", "·").removeprefix("1·")
+    return number(value, 5)
 
 
 def _points(x: Array, y: Array) -> str:

@@ -41,11 +41,11 @@ function values(told) {
 
 const raised = (power) => String(power).replace(/./g, (c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]));
 
-function number(value, digits = 4) {
+function number(value, digits = 4, scientific = false) {
   if (value === null || !Number.isFinite(value)) return "";
   if (value === 0) return "0";
   const power = Math.floor(Math.log10(Math.abs(value)));
-  if (power > -4 && power < Math.max(digits, 6)) {
+  if (!scientific && power > -4 && power < Math.max(digits, 6)) {
     return String(Number(value.toFixed(Math.max(0, digits - 1 - power)))).replace("-", "−");
   }
   const factor = Number((value / 10 ** power).toFixed(digits - 1));
@@ -74,7 +74,11 @@ function axis(about, scale, side) {
     stroke: () => colour("soft"),
     grid: { stroke: () => colour("grid"), width: 1 },
     ticks: { stroke: () => colour("measured"), width: 1, size: 4 },
-    values: (plot, splits) => splits.map((value) => number(value, 5)),
+    values: (plot, splits) => {
+      // all ticks of a logarithmic axis are written alike
+      const scientific = about.log && splits.some((tick) => tick >= 1e5 || tick < 1e-3);
+      return splits.map((tick) => number(tick, 5, scientific));
+    },
     gap: 4,
   };
   if (about.log) Object.assign(made, { splits: (plot, index, low, high) => decades(low, high), filter: (plot, splits) => splits });

@@ -81,15 +81,19 @@ def number(value: float | None, digits: int = 4) -> str:
         return "∞" if value > 0 else f"{MINUS}∞"
     if value == 0.0:
         return "0"
-    text = f"{value:.{digits - 1}e}"
-    mantissa, _, power = text.partition("e")
-    exponent = int(power)
-    if -4 < exponent < max(digits, 6):
-        text = f"{value:.{max(digits - 1 - exponent, 0)}f}"
-        text = text.rstrip("0").rstrip(".") if "." in text else text
-        return text.replace("-", MINUS)
+    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
+    if not -4 < exponent < max(digits, 6):
+        return scientific(value, digits)
+    text = f"{value:.{max(digits - 1 - exponent, 0)}f}"
+    text = text.rstrip("0").rstrip(".") if "." in text else text
+    return text.replace("-", MINUS)
+
+
+def scientific(value: float, digits: int = 4) -> str:
+    """A number with this many significant digits and a power of ten."""
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
     mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
-    return f"{mantissa} × 10{str(exponent).translate(_SUPERSCRIPT)}".replace("-", MINUS)
+    return f"{mantissa} × 10{str(int(power)).translate(_SUPERSCRIPT)}".replace("-", MINUS)
 
 
 def with_unit(text: str, unit: str) -> str:

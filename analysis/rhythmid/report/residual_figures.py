@@ -167,7 +167,7 @@ def _over_states(run: Run, length: str, factor: float, unit: str) -> Drawing:
 def _over_frequency(run: Run, compared: Compared) -> Drawing:
     frequency, whole = density(run, run.measured)
     _, before = density(run, run.residual("before"))
-    factor, unit = scaled(float(np.median(whole)), compared.unit)
+    factor, unit = scaled(float(np.max(whole)), compared.unit)
     curves = [Curve(frequency, factor * whole, f"measured {compared.quantity}", "measured"),
               Curve(frequency, factor * before, run.labels[0], "before")]  # fmt: skip
     if run.after is not None:
@@ -262,7 +262,7 @@ def cycle_harmonics(run: Run, unit: str, noise: float) -> Table | None:
     found = harmonics(run, noise)
     if not found:
         return None
-    factor, shown = scaled(max(h.before for h in found), unit)
+    factor, shown = scaled(max(h.measured for h in found), unit)
 
     def told(value: float | None, one: Harmonic) -> str:
         return (

@@ -12,6 +12,7 @@ from rhythmid.report.quantity import number
 
 ROW = 28.0
 WRAP = 22  # letters in a line of a row's name
+LETTER = 7.9  # [px] mean width of a bold letter at the size of a chart's text; names of marked rows are bold
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Change:
 def row_label_width(labels: Sequence[str]) -> float:
     """Room that the rows' names take."""
     lines = [line for label in labels for line in wrap(label, WRAP)]
-    return max((len(line) for line in lines), default=4) * 7.3 + 14.0
+    return max((len(line) for line in lines), default=4) * LETTER + 14.0
 
 
 def row_label_height(text: str) -> float:
