@@ -20,6 +20,7 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
     left = contest(NOMINAL, friction(0.6), maps={"velocity": predicted(1e-4)})
     cases = {
         "none_yet": replace(contest(NOMINAL, maps={"velocity": predicted(0.1)}), cut_short=True),
+        "not_searched": replace(contest(NOMINAL), cut_short=True, structured=0.5),
         "more_to_try": replace(left, cut_short=True),
         "unnamed_remainder": contest(NOMINAL, maps={"velocity": predicted(0.1)}),
         "missed": contest(supposed("", predicted((0.5 * SIZE) ** 2))),

@@ -6,7 +6,7 @@ import pytest
 from contests import NOMINAL, contest, decided, friction, predicted, supposed
 
 from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
-from rhythmid.diagnose.answer.wording import freed_value, listed, summary_of
+from rhythmid.diagnose.answer.wording import freed_value, listed, longer_delay, summary_of
 from rhythmid.diagnose.family import MissingFamily
 from rhythmid.diagnose.hypothesis import Hypothesis
 from rhythmid.elements.catalogue import load_catalogue
@@ -102,3 +102,12 @@ def test_a_value_of_a_body_keeps_the_files_name_of_its_link():
     assert (
         in_words("coulomb_friction, body.left.arm_1.inertia") == "Coulomb friction, the inertia of left.arm_1"
     )
+
+
+def test_a_delay_that_alone_explains_the_records_is_given_in_the_summary():
+    late = supposed("input_delay.delay", predicted(0.01), "delay")
+    _, decision = decided(contest(NOMINAL, friction(), late))
+    said = longer_delay(0.01227, 9e-6, decision)
+    told = summary_of(decision, [], FitQuality(0.1, 0.1), FitQuality(0.01, 0.01), "motion", said)
+    assert told == "The input is delayed by 12.2700 ± 0.009 ms, longer than was given, and that explains the records."
+    assert longer_delay(0.01227, 9e-6, decided(contest(NOMINAL, friction()))[1]) is None

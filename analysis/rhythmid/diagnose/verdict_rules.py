@@ -20,6 +20,8 @@ from rhythmid.diagnose.constants import (
 )
 from rhythmid.diagnose.hypothesis import Kind, Verdict
 
+LONGER_DELAY = "longer_delay"
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -126,6 +128,16 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         _of_search(_alone(lambda found: found.remainder), True),
     ),
     VerdictRule(
+        "not_searched",
+        "no effect is accepted, and the budget ended the search: the autocorrelated part of the error of the refitted nominal model, as a share of what "
+        "was measured",
+        PRACTICAL,
+        "undecided",
+        "the budget ended the search; {structured:.2g} % of what was measured is missed by the refitted nominal model and is autocorrelated, hence not noise, "
+        "and not all effects that may explain it were tried",
+        _of_search(_alone(lambda found: found.structured), True),
+    ),
+    VerdictRule(
         "unnamed_remainder",
         "no effect is accepted: rms that a free function or further effects predict beyond chance, two standard errors below its estimate, divided by "
         f"that of practical importance, {100 * PRACTICAL:g} % of the motion or {100 * UNNAMED_EFFORT:g} % of the effort",
@@ -180,7 +192,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         tells_family=True,
     ),
     VerdictRule(
-        "longer_delay",
+        LONGER_DELAY,
         "the chosen hypothesis has a longer delay, and no effect beside it can be stated (1)",
         0.0,
         "undecided",

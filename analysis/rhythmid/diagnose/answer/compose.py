@@ -25,6 +25,7 @@ from rhythmid.diagnose.answer.untold import without_untold
 from rhythmid.diagnose.answer.wording import (
     freed_value,
     location_of,
+    longer_delay,
     recalibrated,
     summary_of,
     unstated_delay,
@@ -36,6 +37,7 @@ from rhythmid.diagnose.free_run import FreeRunResult
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
+from rhythmid.diagnose.verdict_rules import LONGER_DELAY
 from rhythmid.identify.held_out_zeros import held_out_zero_notes
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, rerun
@@ -89,7 +91,11 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     groups = _indistinguishable(found.fit.model, decision)
     rivals = [one for one in found.trials if _rivals(one, best, groups)]
     case.tell("choosing the next experiment")
-    needed = decision.verdict != "consistent" and not settled(decision.verdict, groups)
+    freed = freed_value(case.nominal, fit.model, result.selection.chosen)
+    if INPUT_DELAY in fit.names:
+        freed = freed or longer_delay(fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY], decision)
+    settles = settled(decision.verdict, groups) or decision.rule == LONGER_DELAY
+    needed = decision.verdict != "consistent" and not settles
     heldout = {one.key: one.heldout_nrmse for one in contest.hypotheses}
     alternatives = tuple(
         Alternative(
@@ -109,7 +115,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
             plain,
             augmented,
             "motion",
-            freed_value(case.nominal, fit.model, result.selection.chosen),
+            freed,
         ),
         detection=Detection(
             found.rounds[0].p_value,
@@ -136,7 +142,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
             *result.calibration.notes,
             *zeros_told(fit),
             *recalibrated(case.nominal, fit.model, {name: fit.std[name] for name in fit.names}),
-            *_delay_told(case.nominal, fit, result.selection.chosen.elements),
+            *_delay_told(case.nominal, fit),
         ),
         excluded=tuple(Untried(" + ".join(added), why) for added, why in found.excluded),
         heldout=held_out_words(case.holdout, f"the last fifth of every {part}"),
@@ -160,9 +166,9 @@ def _rivals(one: Trial, best: Trial, groups: Sequence[Sequence[str]]) -> bool:
     return names != own and any(names ^ own <= set(group) for group in groups)
 
 
-def _delay_told(nominal: Model, fit: Fit, elements: Sequence[str]) -> tuple[str, ...]:
-    """The sentence about a delay that the nominal model does not have, where no hypothesis about it was chosen."""
-    if INPUT_DELAY in nominal.parameters or INPUT_DELAY in elements or INPUT_DELAY not in fit.names:
+def _delay_told(nominal: Model, fit: Fit) -> tuple[str, ...]:
+    """The sentence about a delay that the nominal model does not have."""
+    if INPUT_DELAY in nominal.parameters or INPUT_DELAY not in fit.names:
         return ()
     return unstated_delay(fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY])
 

@@ -16,12 +16,20 @@ from rhythmid.diagnose.answer.result import (
 )
 from rhythmid.diagnose.answer.untold import without_untold
 from rhythmid.diagnose.answer.varied_motion import motion_varying
-from rhythmid.diagnose.answer.wording import NOT_LOCATED, freed_value, listed, recalibrated, summary_of
+from rhythmid.diagnose.answer.wording import (
+    NOT_LOCATED,
+    freed_value,
+    listed,
+    longer_delay,
+    recalibrated,
+    summary_of,
+)
 from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.found_delay import delay_told, found_delay
 from rhythmid.diagnose.effort.run import EffortResult
 from rhythmid.diagnose.effort.scales import scales_of
+from rhythmid.diagnose.verdict_rules import LONGER_DELAY
 from rhythmid.elements.places import SENTENCES
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import variation_of
@@ -41,7 +49,10 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     before, after = (
         FitQuality(one.fit.error / size, result.errors[one.key] / size) for one in (nominal, chosen)
     )
-    freed = freed_value(case.nominal, chosen.fit.model, result.selection.chosen)
+    late = found_delay(result.search.balance, chosen)
+    freed = freed_value(case.nominal, chosen.fit.model, result.selection.chosen) or longer_delay(
+        late.value, late.std, decision
+    )
     slots = list(dict.fromkeys(effect.slot for effect in missing))
     where = "; and ".join(SENTENCES[slot] for slot in slots) or (
         "nowhere: the refitted nominal model explains the effort"
@@ -115,7 +126,7 @@ def effort_delays(balance: Balance, fitted: Fitted) -> dict:
 def _next_experiment(result: EffortResult) -> str:
     """What to record next."""
     decision = result.decision
-    if settled(decision.verdict, decision.equivalent):
+    if settled(decision.verdict, decision.equivalent) or decision.rule == LONGER_DELAY:
         return (
             "none needed for these records; other speeds, loads and positions would exclude smaller effects"
         )

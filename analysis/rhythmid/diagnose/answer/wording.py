@@ -11,6 +11,7 @@ from rhythmid.diagnose.hypothesis import Hypothesis, Verdict
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
+from rhythmid.diagnose.verdict_rules import LONGER_DELAY
 from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
 from rhythmid.report.quantity import in_words, number, with_std, with_written_unit
@@ -86,8 +87,8 @@ def summary_of(
 ) -> str:
     """The verdict in a sentence or two.
 
-    `whole` is the quantity that errors are a share of. `freed` describes the fixed value that the chosen hypothesis
-    frees, if any. `noise_known`: whether the noise is known otherwise than as what the model leaves.
+    `whole` is the quantity that errors are a share of. `freed` describes the value that the chosen hypothesis frees besides its
+    effects: one that is fixed, or the delay. `noise_known`: whether the noise is known otherwise than as what the model leaves.
     """
     names = listed([effect.element for effect in missing])
     value = "" if freed is None else _begun(freed)
@@ -202,6 +203,14 @@ def recalibrated(nominal: Model, fitted: Model, stds: Mapping[str, float]) -> tu
                 "records"
             )
     return tuple(said)
+
+
+def longer_delay(delay: float, std: float | None, decision: Decision) -> str | None:
+    """The sentence about a delay [s] that alone explains the records; None where the verdict does not rest on it."""
+    if decision.rule != LONGER_DELAY:
+        return None
+    late = with_std(1e3 * delay, None if std is None else 1e3 * std)
+    return f"The input is delayed by {late} ms, longer than was given, and that explains the records."
 
 
 def unstated_delay(delay: float, std: float | None) -> tuple[str, ...]:
