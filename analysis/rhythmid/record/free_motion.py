@@ -100,7 +100,7 @@ def _motion(record: Record, since: float) -> tuple[Array, Array, Array]:
     count = min(len(time), MOST_SAMPLES)
     if count < PLACES:
         return np.empty(0), np.empty(0), np.empty(0)
-    grid = np.linspace(time[0], time[-1], count)
+    grid: Array = np.linspace(time[0], time[-1], count)
     period = float(grid[1] - grid[0])
     value = np.interp(grid, time, value)
     power = np.abs(np.fft.rfft((value - value.mean()) * np.hanning(count))) ** 2
@@ -108,11 +108,11 @@ def _motion(record: Record, since: float) -> tuple[Array, Array, Array]:
     highest = max(int(np.searchsorted(total, POWER * total[-1])), 1) / (count * period)
     length = min(max(2 * int(0.5 * SMOOTHED / (highest * period)) + 1, 5), 2 * ((count - 1) // 2) - 1)
     if record.output_kind == "velocity":
-        speed = savgol_filter(value, length, 2)
+        speed = np.asarray(savgol_filter(value, length, 2), dtype=np.float64)
         position = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * period])
         return position, speed, grid
-    speed = savgol_filter(value, length, 2, deriv=1, delta=period)
-    return savgol_filter(value, length, 2), speed, grid
+    speed = np.asarray(savgol_filter(value, length, 2, deriv=1, delta=period), dtype=np.float64)
+    return np.asarray(savgol_filter(value, length, 2), dtype=np.float64), speed, grid
 
 
 def _strokes(speed: Array) -> list[slice]:

@@ -6,7 +6,7 @@ The format need not be declared: the separator is the one with which most lines 
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -85,10 +85,21 @@ def text_table(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     if is_trace(begin):
         with opened(path) as file:
             return dict[str, Any](read_trace(file)), ()
-    dialect, lvm = dialect_of(begin, str(path)), lvm_head(begin)
     with opened(path) as file:
-        lines = islice(unbroken(file), dialect.first, None)
-        rows = rows_in(lines, dialect.first, dialect.separator, dialect.head)
+        return table_of(file, str(path), begin)
+
+
+def table_of(
+    lines: Iterable[str], name: str, begin: list[str] | None = None
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Columns of the lines of a text table, and messages, as of `text_table`. `name` is the table's in messages, and
+    `begin` its first lines, without broken cells, where `lines` can be read only once."""
+    if begin is None:
+        lines = list(lines)
+        begin = list(islice(unbroken(lines), LOOKED_AT))
+    dialect, lvm = dialect_of(begin, name), lvm_head(begin)
+    body = islice(unbroken(lines), dialect.first, None)
+    rows = rows_in(body, dialect.first, dialect.separator, dialect.head)
     count = len(dialect.names)
     words = [place for place in range(count) if place not in dialect.numeric]
     numbers = numbers_of(rows, dialect.separator, dialect.decimal, dialect.numeric)
