@@ -149,10 +149,11 @@ def follows(command: Recorded, answer: Recorded) -> Follows:
     product = np.fft.irfft(np.fft.rfft(y, length) * np.conj(np.fft.rfft(u, length)), length)
     most = min(int(LATEST_ANSWER / period), len(u) // 4)
     lags = np.concatenate([np.arange(most + 1), np.arange(-most, 0)])
-    best = _peak(u, y, int(lags[int(np.argmax(np.abs(product[lags])))]), most)
+    strongest = int(lags[int(np.argmax(np.abs(product[lags])))])
+    best = _peak(u, y, strongest, most)
     size = math.sqrt(float(u @ u) * float(y @ y))
     later = max(float(product[: most + 1].max()) / size, 0.0)
-    return Follows(float(product[best]) / size, best * period, float(np.std(y) / np.std(u)), later)
+    return Follows(float(product[strongest]) / size, best * period, float(np.std(y) / np.std(u)), later)
 
 
 def _peak(u: Array, y: Array, lag: int, most: int) -> int:
