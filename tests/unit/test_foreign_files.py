@@ -43,7 +43,7 @@ def test_the_commands_refuse_it_with_exit_code_2_and_a_folder_of_such_bags_too(t
         assert isinstance(done.exception, InputError) and "rosbags-convert --src" in str(done.exception)
 
 
-@pytest.mark.parametrize("name", ["run.xlsx", "run.tdms", "run.mf4", "run.psdata", "run.pkl"])
+@pytest.mark.parametrize("name", ["run.xls", "run.tdms", "run.mf4", "run.psdata", "run.pkl"])
 def test_other_files_are_refused_with_what_to_do(tmp_path, name):
     (tmp_path / name).write_bytes(b"x")
     with pytest.raises(InputError, match="which is not read; save it as .csv"):

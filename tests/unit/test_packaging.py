@@ -101,7 +101,7 @@ def test_the_metadata_says_what_the_package_is(wheel):
     assert said["Requires-Python"] and "Programming Language :: Python :: 3.11" in said.get_all(
         "Classifier", []
     )
-    assert {"batch", "hdf5", "legs", "notebook", "parquet", "report", "ros", "testing"} <= set(
+    assert {"batch", "excel", "hdf5", "legs", "notebook", "parquet", "report", "ros", "testing"} <= set(
         said.get_all("Provides-Extra", [])
     )
     assert any("hdl.handle.net" in one for one in said.get_all("Project-URL", []))

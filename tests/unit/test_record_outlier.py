@@ -33,6 +33,15 @@ def test_outliers_are_found_and_nothing_else(seed, noise, width):
     assert np.array_equal(np.flatnonzero(outlying_samples(value)), np.sort(wrong))
 
 
+@pytest.mark.parametrize("count", [1.0 / 11.0, 360.0 / 4096])
+def test_steps_of_an_encoder_that_were_rounded_again_are_no_outliers(count):
+    angle = 100.0 * np.exp(-0.2 * TIME) * np.cos(11.0 * TIME)
+    value = np.round(count * np.round(angle / count), 2)
+    assert not outlying_samples(value).any()
+    value[3000] += 5.0
+    assert np.flatnonzero(outlying_samples(value)).tolist() == [3000]
+
+
 @given(seed=seeds, times=st.integers(2, 10), noise=st.sampled_from([1e-4, 1e-2]))
 def test_a_sensor_that_is_read_more_often_than_it_measures_keeps_its_measurements(seed, times, noise):
     fresh = motion(np.random.default_rng(seed), noise)[::times]

@@ -241,7 +241,7 @@ def test_a_spoilt_text_table_is_refused_with_one_line(tmp_path, fault):
         (
             "run.doc",
             b"PK",
-            "is not a table; .mat, .h5, .hdf5, .npz, .npy, .parquet, .json, .jsonl, .ndjson, .csv, .tsv, .txt, .dat, .lvm, .log can be read",
+            "is not a table; .mat, .h5, .hdf5, .npz, .npy, .parquet, .xlsx, .xlsm, .json, .jsonl, .ndjson, .csv, .tsv, .txt, .dat, .lvm, .log can be read",
         ),
     ],
 )

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tables import write_columns
 
 from rhythmid.identify.identify import identify
 from rhythmid.model import Model
@@ -84,12 +85,24 @@ def test_a_machine_that_is_driven_may_rest_before_it_is():
     assert told(speed_of(drive), drive) == ()
 
 
+def test_init_begins_each_of_several_records_where_it_is_free(tmp_path):
+    for name, held in (("one", 1.0), ("two", 0.0), ("three", 2.0)):
+        write_columns(tmp_path / f"{name}.csv", {"t": TIME, "angle": swing(1.2, held)})
+    sources = [tmp_path / f"{name}.csv" for name in ("one", "two", "three")]
+    begun = start(sources)
+    (tmp_path / "signals.yaml").write_text(begun.signals)
+    first = [load(one, tmp_path / "signals.yaml").output.time[0] for one in sources]
+    assert first == pytest.approx([1.05, 0.0, 2.05], abs=0.05)
+    assert any("CHECK output: three: it rests for the first 2" in line for line in begun.lines())
+
+
 def test_init_check_and_identify_say_from_where_a_swing_is_free(tmp_path):
     rows = (f"{t:.2f},{y:.6f}" for t, y in zip(TIME, swing(1.2, 1.0)))
     (tmp_path / "run.csv").write_text("\n".join(["t,angle", *rows]) + "\n")
     begun = start([tmp_path / "run.csv"])
-    assert "# use: [1." in begun.signals and "rests for the first 1" in begun.signals
-    (tmp_path / "signals.yaml").write_text(begun.signals)
+    assert "\nuse: [1." in begun.signals and "rests for the first 1" in begun.signals
+    held = begun.signals.replace("\nuse:", "\n# use:")
+    (tmp_path / "signals.yaml").write_text(held)
     (tmp_path / "model.yaml").write_text(begun.model)
     lines = quality_report(tmp_path / "run.csv", tmp_path / "signals.yaml").lines()
     assert any("rests for the first 1" in line for line in lines)

@@ -6,12 +6,17 @@ import foreign
 import numpy as np
 import pytest
 from foreign import moved, tones
+from scipy.signal import lfilter
 
+from rhythmid.commands.model_line import model_lines
+from rhythmid.record.load import load
+from rhythmid.record.signals import Signals
 from rhythmid.start.start import Start, start
 
 TIME = foreign.STEP * np.arange(12_000)
 LATE = 0.08  # s
 FORCE = tones(1, TIME)
+SHORT = FORCE[:4000]
 
 
 def begun(folder: Path, force: np.ndarray, position: np.ndarray) -> Start:
@@ -95,7 +100,52 @@ def test_an_effort_of_the_opposite_sign_is_told_with_what_the_balance_explains(t
     x = moved(FORCE, 0.05, 0.3, stiffness, dry)[0]
     right, wrong = begun(tmp_path, FORCE, x), begun(tmp_path, -FORCE, x)
     assert doubt_of_sign(wrong) and not doubt_of_sign(right)
+    assert ", scale: -1}" in wrong.signals and ", scale: " not in right.signals
     assert wrong.nominal.model.value("inertia.mass") == right.nominal.model.value("inertia.mass")
+
+
+def test_check_tells_an_effort_whose_sign_is_not_turned_round(tmp_path):
+    x = moved(SHORT, 0.05, 0.3, 6.0)[0]
+    np.savez(tmp_path / "run.npz", t=TIME[: len(SHORT)], force=-SHORT, x=x)
+    wrong = start([tmp_path / "run.npz"])
+    (tmp_path / "model.yaml").write_text(wrong.model)
+    for signals, said in ((wrong.signals, False), (wrong.signals.replace(", scale: -1}", "}"), True)):
+        record = load(tmp_path / "run.npz", Signals.from_text(signals))
+        lines = model_lines(tmp_path / "model.yaml", [record])
+        assert any("with scale: -1 for the input" in line for line in lines) == said
+
+
+@pytest.mark.parametrize(("zero", "stiffness"), [(2.5, 6.0), (-40.0, 6.0), (12.0, 0.0)])
+def test_an_input_whose_zero_is_elsewhere_gets_an_offset(tmp_path, zero, stiffness):
+    x = moved(SHORT, 0.05, 0.3, stiffness)[0]
+    np.savez(
+        tmp_path / "run.npz",
+        **{"t": TIME[: len(SHORT)], "voltage [V]": 0.02 * SHORT + zero, "angle [rad]": 0.02 * x},
+    )
+    found = start([tmp_path / "run.npz"])
+    read = load(tmp_path / "run.npz", Signals.from_text(found.signals)).input
+    assert abs(read.value.mean()) < 0.02 * np.ptp(read.value)
+    assert any(line.startswith("CHECK input: it stays within") for line in found.lines())
+    if stiffness:
+        assert abs(found.nominal.model.value("linear_spring.rest_length")) < 0.02 * np.ptp(x)
+
+
+@pytest.mark.parametrize(("unit", "by", "level"), [("Nm", 12.0, 0.0), ("V", 0.2, 0.0), ("V", 12.0, 50.0)])
+def test_a_load_a_small_mean_and_a_motion_that_is_as_far_off_are_no_offset(tmp_path, unit, by, level):
+    x = moved(SHORT, 0.05, 0.3, 6.0 if level else 0.0)[0]
+    np.savez(
+        tmp_path / "run.npz",
+        **{"t": TIME[: len(SHORT)], f"tau [{unit}]": SHORT + by, "angle [rad]": x + level},
+    )
+    assert "offset:" not in start([tmp_path / "run.npz"]).signals
+
+
+def test_a_delay_that_a_lag_explains_nearly_as_well_is_not_guessed(tmp_path):
+    lagged = lfilter([0.04], [1.0, -0.96], SHORT)
+    thrust = np.sign(lagged) * lagged**2
+    x = moved(thrust, 0.05, 0.5, 6.0, 0.1)[0]
+    np.savez(tmp_path / "run.npz", t=TIME[: len(SHORT)], force=SHORT, x=x)
+    assert "input_delay" not in labels(start([tmp_path / "run.npz"]))
 
 
 def test_an_effort_of_the_opposite_sign_is_told_of_a_pendulum(tmp_path):
@@ -125,7 +175,8 @@ def pendulum(folder: Path, heading: str, scale: float = 1.0, sign: float = 1.0) 
 def test_an_angle_in_degrees_without_a_unit_is_told_where_gravity_shows_it(tmp_path, sign):
     found = pendulum(tmp_path, "angle", 180.0 / np.pi, sign)
     (line,) = [line for line in found.lines() if "with the output in degrees (scale: 0.0174532925)" in line]
-    assert line.startswith("CHECK ") and ("scale: -1 for the input" in line) == (sign < 0.0)
+    assert line.startswith("CHECK output") and doubt_of_sign(found) == (sign < 0.0)
+    assert 'column: "angle", unit: "rad", scale: 0.01745329252}' in found.signals
     assert found.nominal.model.value("pendulum_gravity.moment") == pytest.approx(4.0, rel=0.1)
 
 

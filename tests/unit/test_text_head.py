@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rhythmid.record.inventory import inventory
 from rhythmid.record.table import Table
 from rhythmid.record.text_table import read_text
 
@@ -41,6 +42,32 @@ def test_names_and_units_are_found_in_the_lines_above_the_rows(tmp_path, head, n
     table = Table.load(tmp_path / "run.csv")
     assert list(table.columns) == names
     assert [table.column(name)[0] for name in names] == [0.01, 0.1, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("head", "names"),
+    [
+        ("start deg, sample_rate\n90, 1000\n", ["0", "1", "2"]),
+        ("start deg, sample_rate\n90, 1000\nTime,Position,Torque\n", PLAIN),
+        ("Time,Position,Torque\nstart deg; sample_rate\n90; 1000\n", PLAIN),
+        ("Time,Position,Torque\n1000\n", PLAIN),
+        ("90, 1000, 5, 7\nTime,Position,Torque\n", PLAIN),
+    ],
+)
+def test_numbers_above_the_rows_that_are_more_or_fewer_than_the_columns_name_nothing(tmp_path, head, names):
+    (tmp_path / "run.csv").write_text(head + ROWS)
+    table = Table.load(tmp_path / "run.csv")
+    assert list(table.columns)[:3] == names
+    assert all(len(table.column(name)) == 59 for name in names)
+
+
+def test_like_files_whose_settings_differ_have_the_same_columns_and_the_rate_that_is_stated_above(tmp_path):
+    swing = 40.0 * np.cos(0.02 * np.arange(2000))
+    for start in (90, 45):
+        text = "".join(f"{value:.2f}\n" for value in swing)
+        (tmp_path / f"{start}.txt").write_text(f"start_deg, sample_rate\n{start}, 500 \n{text}")
+        found = inventory(tmp_path / f"{start}.txt")
+        assert [one.column for one in found.recorded] == ["0"] and found.clock.rate == 500.0
 
 
 @pytest.mark.parametrize("separator", [";", "\t", " "])

@@ -19,14 +19,15 @@ def model_lines(
     elements: Sequence[Path] = (),
     joints: Sequence["JointRecord"] = (),
 ) -> list[str]:
-    """What a model is, in one line, and notes: on each unit of the records that is not the model's, and on the share of them in which
-    the machine rests, where their effort would be scored. `joints` are the records of a machine of several joints.
+    """What a model is, in one line, and notes: on each unit of the records that is not the model's, on an effort of the opposite
+    sign, and on the share of the records in which the machine rests, where their effort would be scored. `joints` are the records of a machine of several joints.
 
     Raises InputError as a diagnosis would, where the model is wrong or the records do not fit it.
     """
     from rhythmid.commands.machines import is_machine
     from rhythmid.diagnose.admission import admitted
     from rhythmid.elements.catalogue import load_catalogue
+    from rhythmid.start.balanced import sign_note
 
     catalogue = load_catalogue(elements)
     if is_machine(path):
@@ -39,13 +40,14 @@ def model_lines(
         paths = "; ".join(f"{joint}: {_elements(model)}" for joint, model in machine.paths.items())
         return [f"{path}: {len(machine.joints)} joints; {paths}; {_free(machine.free)}"]
     model = Model.load(path, catalogue)
-    rests = _rests(admitted(records, [], model).whole_records, model) if records else None
-    units = model.units
+    units, whole = model.units, admitted(records, [], model).whole_records if records else []
+    rests, sign = _rests(whole, model), sign_note(whole, units)
     mass = model.parameters[INERTIA]
     told = f"inertia {with_written_unit(f'{mass.value:g}', mass.unit)}{' (fixed)' if mass.fixed else ''}; {_elements(model)}; {_free(model.free)}"
     return [
         f"{path}: {told}; units {units.force}, {units.position}, {units.mass}",
         *(f"  note: {note}" for one in records for note in _foreign_units(one, model)),
+        *(f"  note: {note}" for note in (sign,) if note is not None),
         *(f"  note: were the effort scored: {note}" for note in (rests,) if note is not None),
     ]
 

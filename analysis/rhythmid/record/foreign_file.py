@@ -8,7 +8,7 @@ from rhythmid.errors import InputError
 SAVE_AS_CSV = "save it as .csv in the program that wrote it"
 KINDS = {
     ".bag": "a bag of ROS 1",
-    ".xlsx": "a workbook", ".xls": "a workbook", ".ods": "a workbook",
+    ".xls": "a workbook of an old format", ".ods": "a workbook of another format",
     ".tdms": "a file of LabVIEW", ".mf4": "a file of measurements in MDF", ".mdf": "a file of measurements in MDF",
     ".psdata": "a file of PicoScope", ".sal": "a capture of Saleae's Logic",
     ".pkl": "a pickle, which may run any code", ".pickle": "a pickle, which may run any code",

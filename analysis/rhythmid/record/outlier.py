@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from rhythmid.record.quality import clipped_samples
-from rhythmid.record.rounding import resolution, resolutions
+from rhythmid.record.rounding import least_step, resolution, resolutions
 
 WIDEST = 3  # largest number of consecutive outliers
 FAR_OFF = 12.0  # ratio to the usual roughness above which a sample is suspected
@@ -44,7 +44,8 @@ def outlying_samples(value: Array) -> Mask:
         return found
     uneven = np.abs(value[1:-1] - 0.5 * (value[:-2] + value[2:]))
     usual = USUAL * np.maximum(median_filter(uneven, SAMPLES_OF_UNEVENNESS), np.median(uneven))
-    limit = FAR_OFF * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), resolutions(value))
+    rounded = np.maximum(resolutions(value), least_step(value))
+    limit = FAR_OFF * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), rounded)
     for width in range(1, WIDEST + 1):
         first = np.arange(1, len(value) - width)
         last = first + width

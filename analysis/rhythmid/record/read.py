@@ -25,7 +25,7 @@ from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
 from rhythmid.record.record import FEWEST_COMMON_SAMPLES, Channel, Record
 from rhythmid.record.sign_bit import signed
-from rhythmid.record.signals import Signals, Sinusoid, Source
+from rhythmid.record.signals import WHOLE, Signals, Sinusoid, Source
 from rhythmid.record.stale_rows import without_stale_rows
 from rhythmid.record.standstill import is_driven
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
@@ -337,8 +337,8 @@ def _finish(record: Record, signals: Signals) -> Record:
     """Count held commands as known, cut to the used part, reject unusable data, and add a forcing that is given by a
     formula."""
     record = with_held_commands(record)
-    if signals.use != (-np.inf, np.inf):
-        record = record.cut(*signals.use)
+    if (part := signals.part(record.name)) != WHOLE:
+        record = record.cut(*part)
     for role, channel in record.channels.items():
         finite = np.isfinite(channel.value)
         if not finite.all():

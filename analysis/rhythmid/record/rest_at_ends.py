@@ -6,6 +6,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.record.free_motion import freed
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
@@ -14,12 +15,6 @@ LEAST_SHARE = 0.05
 WINDOWS = 3  # stretches before a rest in all of which the machine must move
 # ratio to the usual travel of a drive above which the drive continues as before: steps of equal size have 1
 AS_MUCH = 0.9
-AT_REST = 0.02  # share of a motion's distance from its start up to which it has not begun
-HALFWAY = 0.5  # half of that distance
-# least duration of a rest before the motion, relative to the time from the start to half of the distance. A machine
-# released at the first sample stays within a fiftieth for at most a quarter of that time: the parabola of a
-# constant force
-LONG = 1.0
 
 
 def rest_notes(record: Record) -> tuple[str, ...]:
@@ -29,11 +24,16 @@ def rest_notes(record: Record) -> tuple[str, ...]:
 
 def rests_of(record: Record) -> tuple[str, ...]:
     """Message about such rests, a sentence each."""
-    time, begin, end = record.output.time, release(record), stop(record)
+    time, free, end = record.output.time, freed(record), stop(record)
     found: list[str] = []
-    if begin is not None:
+    if free is not None and free.pushed:
         found.append(
-            f"it rests for the first {begin - time[0]:.3g} s and then moves, though nothing that drives it was recorded: it was held or "
+            f"it gains speed until t = {_written(free.until)} s at least, though nothing that drives it was recorded: it was pushed, which no model "
+            f"of the machine does; begin where it moves freely:  {use_line(record)}"
+        )
+    elif free is not None:
+        found.append(
+            f"it rests for the first {free.until - time[0]:.3g} s and then moves, though nothing that drives it was recorded: it was held or "
             f"pushed, which no model of the machine does; begin where it moves freely:  {use_line(record)}"
         )
     if end is not None:
@@ -47,10 +47,10 @@ def rests_of(record: Record) -> tuple[str, ...]:
 
 def use_line(record: Record) -> str | None:
     """The line of signals.yaml that excludes such rests; None where there are none."""
-    time, begin, end = record.output.time, release(record), stop(record)
-    if begin is None and end is None:
+    time, free, end = record.output.time, freed(record), stop(record)
+    if free is None and end is None:
         return None
-    first = math.floor(time[0]) if begin is None else begin
+    first = math.floor(time[0]) if free is None else free.begin
     last = math.ceil(time[-1]) if end is None else end
     return f"use: [{_written(first)}, {_written(last)}]"
 
@@ -77,23 +77,6 @@ def stop(record: Record) -> float | None:
         if now == 0.0 or now < AS_MUCH * usual:
             return None
     return float(time[last])
-
-
-def release(record: Record) -> float | None:
-    """End [s] of the rest with which an undriven output starts; None where it moves from its first sample on."""
-    if any(one is not None for one in (record.input, record.effort, record.reference, record.forcing)):
-        return None
-    value, time = record.output.value, record.output.time
-    away = np.abs(value - np.median(value[:WINDOWS]))
-    way = float(away.max())
-    if way == 0.0:
-        return None
-    moving = int(np.argmax(away > AT_REST * way))
-    if moving == 0:
-        return None
-    half = float(time[np.argmax(away > HALFWAY * way)])
-    rested = float(time[moving - 1])
-    return rested if rested - time[0] >= LONG * (half - rested) else None
 
 
 def _integral(time: Array, given: Array) -> float:

@@ -24,6 +24,8 @@ BASES = (10.0, 2.0)  # of decimal and of binary numbers
 RUNG = 0.02  # relative deviation of a step from another one times a power of the base
 # share of bands with a grid whose steps differ by such powers; evenly sampled motions can form grids of any step
 LADDER = 0.9
+# share of the steps between levels that may be narrower than the rounding step: values of another source
+NARROW = 1.0 - ROUNDED
 # share of samples in bands with a grid above which the step depends on the size: few values near zero are equal
 FLOATING = 0.5
 
@@ -40,6 +42,18 @@ def shown_resolution(value: Array) -> float:
     """The same; 0 where there are few distinct values, which may be all levels of the signal: a square wave is not
     rounded to its height."""
     return resolution(value) if len(np.unique(value)) >= LEVELS else 0.0
+
+
+def least_step(value: Array) -> float:
+    """Step between neighbouring levels of the values (n,) that nearly all such steps reach; 0 for few levels.
+
+    It is the rounding step also where no grid is detected, as for an encoder's angle that was written with too few
+    decimals. Where values are not rounded, it is a small part of their usual distance, and so of no effect.
+    """
+    levels = np.unique(value)
+    steps = np.diff(levels)
+    steps = steps[steps > HAIR * _span(value)]
+    return float(np.quantile(steps, NARROW)) if len(levels) >= LEVELS and len(steps) else 0.0
 
 
 def resolutions(value: Array) -> Array:

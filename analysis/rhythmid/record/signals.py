@@ -4,7 +4,7 @@
     input:   {topic: /hopper/excitation,   field: "effort[leg]"}
     output:  {topic: /hopper/joint_states, field: "position[leg]"}
     forcing: {topic: /hopper/forcing,      field: "effort[leg]"}
-    use: [10, 90]                     # seconds of the record's time, the end excluded
+    use: [10, 90]                     # seconds of the record's time, the end excluded; or by record: {slow: [10, 90], fast: [2, 40]}
     # on input: kind: force (default) | base_displacement | base_acceleration | reference; hold: zero | linear | band_limited
     # on output: kind: position (default) | velocity | acceleration
     parameters: {position_control.proportional: 12.5}      # what the model's parameters were in this record
@@ -37,7 +37,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.field import Field
 from rhythmid.simulation.signal import Hold
 from rhythmid.units import multiple_of_si
-from rhythmid.validation import ByShape, InKeys, Number, Plain, Range, validated
+from rhythmid.validation import ByShape, InKeys, Number, Plain, Range, Word, validated
 
 InputKind = Literal["force", "base_displacement", "base_acceleration", "reference"]
 OutputKind = Literal["position", "velocity", "acceleration"]
@@ -48,6 +48,8 @@ INPUT_UNITS: dict[InputKind, str] = {
 }  # fmt: skip
 OUTPUT_UNITS: dict[OutputKind, str] = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 KEYS = ConfigDict(extra="forbid")
+Part = tuple[float, float]  # start and end [s] of a part of a record
+WHOLE: Part = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class Signals:
     input_kind : kind of the input.
     output_kind : kind of the output; an acceleration is absolute, not relative to a moving base.
     hold : interpolation of the input between its samples; None for the default of its kind of record.
-    use : [t0, t1) in seconds of the record's time.
+    use : [t0, t1) in seconds of the record's time; for several records, by record name.
     optional : roles that may be absent from the bag (the forcing of the default signals).
     parameters : values of the model's parameters in this record, by "element.parameter"; for several records, by
         record name.
@@ -126,7 +128,7 @@ class Signals:
     input_kind: InputKind = "force"
     output_kind: OutputKind = "position"
     hold: Hold | None = None
-    use: tuple[float, float] = (-math.inf, math.inf)
+    use: Part | Mapping[str, Part] = WHOLE
     optional: frozenset[str] = field(default_factory=frozenset)
     path: Path | None = None
     parameters: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict)
@@ -144,6 +146,16 @@ class Signals:
                 value = value[record]
             found[name] = value
         return found
+
+    def part(self, record: str) -> Part:
+        """The part of a record that is used. Raises InputError where the parts by record lack this one."""
+        if not isinstance(self.use, Mapping):
+            return self.use
+        if record not in self.use:
+            raise InputError(
+                f"{self.path}: use: has no part of the record {record!r}, only of {', '.join(self.use)}; write  {record}: [0, 60]  there, in s"
+            )
+        return self.use[record]
 
     @property
     def from_tables(self) -> bool:
@@ -289,7 +301,7 @@ class _Document:
     velocity: Annotated[_Channel | None, Absent] = None
     effort: Annotated[_Channel | None, Absent] = None
     reference: Annotated[_Channel | None, Absent] = None
-    use: Range = (-math.inf, math.inf)
+    use: Annotated[Annotated[dict[Word, Range], InKeys] | Annotated[Range, Plain], ByShape] = WHOLE
     tables: _Tables | None = None
     parameters: dict[
         str, Annotated[Annotated[dict[str, Number], InKeys] | Annotated[Number, Plain], ByShape]

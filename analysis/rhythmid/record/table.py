@@ -1,4 +1,4 @@
-"""Tables: columns of numbers in .mat, .h5, .npz, .parquet, .json, .csv and other text files, also compressed
+"""Tables: columns of numbers in .mat, .h5, .npz, .parquet, .xlsx, .json, .csv and other text files, also compressed
 (.csv.gz)."""
 
 import math
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
 from rhythmid.record.counter_wrap import unwrapped
+from rhythmid.record.excel_table import EXCEL, read_excel
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.hdf5_table import NUMBERS, is_hdf5, read_hdf5
 from rhythmid.record.joined_stamps import with_joined_stamps
@@ -29,7 +30,7 @@ from rhythmid.record.text_file import COMPRESSED
 from rhythmid.record.text_table import TEXT, text_table
 
 HDF5 = (".h5", ".hdf5")
-SUFFIXES = (".mat", *HDF5, ".npz", ".npy", ".parquet", *JSON, *TEXT)
+SUFFIXES = (".mat", *HDF5, ".npz", ".npy", ".parquet", *EXCEL, *JSON, *TEXT)
 WIDEST = 64  # columns of an array above which it is an image or a scan, not joints
 LABELLED = (
     ("label", "values"),
@@ -66,13 +67,13 @@ class Table:
         """Read a table. Raises InputError when the file is missing, damaged or of an unknown kind."""
         readers = {
             ".mat": _mat, ".npz": _npz, ".npy": _npy, ".parquet": _parquet, **dict.fromkeys(HDF5, read_hdf5), **dict.fromkeys(JSON, read_json),
-            **dict.fromkeys(TEXT, text_table),
+            **dict.fromkeys(TEXT, text_table), **dict.fromkeys(EXCEL, read_excel),
         }  # fmt: skip
         read = readers.get(table_suffix(path))
         if read is None:
             refuse_foreign(path)
             raise InputError(
-                f"{path}: is not a table; .mat, {', '.join(HDF5)}, .npz, .npy, .parquet, {', '.join((*JSON, *TEXT))} can be read"
+                f"{path}: is not a table; .mat, {', '.join(HDF5)}, .npz, .npy, .parquet, {', '.join((*EXCEL, *JSON, *TEXT))} can be read"
             )
         try:
             check_content(path)

@@ -6,8 +6,8 @@ The format need not be declared: the separator is the one with which most lines 
 
 import re
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from rhythmid.record.labelled_rows import labels_of, read_labelled
 from rhythmid.record.list_cells import list_of, lists_of
 from rhythmid.record.lvm_head import lvm_head
 from rhythmid.record.measured_cells import is_measured, measured
+from rhythmid.record.settings_above import without_settings
 from rhythmid.record.text_cells import COMMENTS, cells_of, content, is_missing, is_number, number_of
 from rhythmid.record.text_file import opened
 from rhythmid.record.text_head import names_of
@@ -49,6 +50,7 @@ class Dialect:
     numeric : indices of the columns that hold numbers.
     head : cells of the line above the rows.
     notes : messages about the names, one line each.
+    settings : numbers by name that stand above the table.
     """
 
     separator: str | None
@@ -58,6 +60,7 @@ class Dialect:
     numeric: tuple[int, ...]
     head: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    settings: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 def read_text(path: Path) -> dict[str, Any]:
@@ -82,10 +85,21 @@ def text_table(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     if is_trace(begin):
         with opened(path) as file:
             return dict[str, Any](read_trace(file)), ()
-    dialect, lvm = dialect_of(begin, str(path)), lvm_head(begin)
     with opened(path) as file:
-        lines = islice(unbroken(file), dialect.first, None)
-        rows = rows_in(lines, dialect.first, dialect.separator, dialect.head)
+        return table_of(file, str(path), begin)
+
+
+def table_of(
+    lines: Iterable[str], name: str, begin: list[str] | None = None
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Columns of the lines of a text table, and messages, as of `text_table`. `name` is the table's in messages, and
+    `begin` its first lines, without broken cells, where `lines` can be read only once."""
+    if begin is None:
+        lines = list(lines)
+        begin = list(islice(unbroken(lines), LOOKED_AT))
+    dialect, lvm = dialect_of(begin, name), lvm_head(begin)
+    body = islice(unbroken(lines), dialect.first, None)
+    rows = rows_in(body, dialect.first, dialect.separator, dialect.head)
     count = len(dialect.names)
     words = [place for place in range(count) if place not in dialect.numeric]
     numbers = numbers_of(rows, dialect.separator, dialect.decimal, dialect.numeric)
@@ -104,7 +118,8 @@ def text_table(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
             found[names[place]] = values
     if lvm is not None and lvm.step > 0.0:
         found[names[0]] = lvm.times(len(rows))
-    return {name: found[name] for name in names}, dialect.notes
+    settings = {name: np.array([value]) for name, value in dialect.settings.items() if name not in found}
+    return {**{name: found[name] for name in names}, **settings}, dialect.notes
 
 
 def dialect_of(lines: list[str], name: str) -> Dialect:
@@ -129,7 +144,8 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
         for index in range(len(cells))
         if number_of(_first_told(split[place:], index), decimal) is not None and index not in lists
     )
-    above = _names_above(split[:place], used[place - 1][1] if place else "", len(cells))
+    last, settings = without_settings([line for _, line in used[:place]], len(cells), SEPARATORS)
+    above = _names_above(split[:last], used[last - 1][1] if last else "", len(cells))
     head = names_of(above, len(cells))
     if head is not None and lvm is not None:
         head = lvm.names(head, len(cells))
@@ -140,9 +156,9 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
     if len(head) == len(cells) - 1 and not cells[-1]:  # every row ends with a separator
         numeric = numeric[:-1]
     elif len(head) != len(cells):
-        line = used[place - 1][0] + 1
+        line = used[last - 1][0] + 1
         raise InputError(f"{name}: line {line} has {len(head)} columns, the rows have {len(cells)}")
-    head, notes = _told_apart(head, used[place - 1][0] + 1 if place else 1)
+    head, notes = _told_apart(head, used[last - 1][0] + 1 if last else 1)
     return Dialect(
         separator,
         decimal,
@@ -151,6 +167,7 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
         numeric,
         tuple(above[-1]) if above else (),
         notes,
+        settings,
     )
 
 

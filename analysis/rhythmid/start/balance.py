@@ -2,12 +2,14 @@
 sign, the position and its sine. It gives a first guess for a nominal model; the estimate is the task of
 `identify`."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
+from scipy.signal import lfilter
 
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
@@ -22,6 +24,9 @@ EARNS_PLACE = 0.9  # ratio of residuals to which an element has to lower the bal
 # which any element absorbs at random. With a delay of half a radian, inertia, damper and spring leave (ω τ)²/2 of
 # the size, which is as much; with a shorter one less
 OF_THE_DRIVE = 0.015
+# ratio of residuals below which a delay is better than a lag however little both leave: a lag in place of a delay leaves
+# (ω τ)⁴/4 of the power, and more with every further effect that it takes on
+OF_A_LAG = 0.5
 STEADY = 1e-9  # relative variation below which the driving signal is constant: rounding error of the filters
 COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant", "friction")
 POSITIVE = frozenset({"acceleration", "velocity", "position", "friction"})
@@ -107,7 +112,8 @@ class Rows:
     def delay(self, names: Sequence[str]) -> float:
         """Delay [s] of the driving signal that makes the balance of these columns clearly better; else 0.
 
-        If the balance still improves at the end of the range, no delay is detected.
+        If the balance still improves at the end of the range, no delay is detected; nor if a lag of the driving signal
+        explains nearly as much.
         """
         if self.by_base or self.steady or self.is_fed_back():
             return 0.0
@@ -119,7 +125,19 @@ class Rows:
         at_once = self.fit(names)
         best = min((self.fit(names, one) for one in delays), key=lambda law: law.left, default=at_once)
         at_the_end = not delays or best.delay == delays[-1]
-        return best.delay if best.earns_place(at_once) and not at_the_end else 0.0
+        if at_the_end or not best.earns_place(at_once):
+            return 0.0
+        lag = min((self.lagged(one).fit(names) for one in delays), key=lambda law: law.left)
+        return best.delay if best.earns_place(lag) or best.left < OF_A_LAG * lag.left else 0.0
+
+    def lagged(self, constant: float) -> "Rows":
+        """The same rows with the driving signal after a lag of this time constant [s]."""
+        shares = [math.exp(-period / constant) for period in self.period]
+        made = [
+            lfilter([1.0 - share], [1.0, -share], drive - drive[0]) + drive[0]
+            for share, drive in zip(shares, self.drives, strict=True)
+        ]
+        return replace(self, drives=tuple(made))
 
     def is_fed_back(self) -> bool:
         """Whether the driving signal is −k times the position plus a constant: a delayed balance would fit that

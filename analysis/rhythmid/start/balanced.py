@@ -6,9 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from rhythmid.elements.force.pendulum_gravity import LEAST_SWING
-from rhythmid.model import Model
+from rhythmid.errors import InputError
+from rhythmid.model import MASS, Model
 from rhythmid.record.record import Record
 from rhythmid.start.balance import LATEST_ACTION, Law, Rows
+from rhythmid.start.correction import Correction
+from rhythmid.units import Units
+from rhythmid.value import Value
 
 UNEXPLAINED = 0.8  # largest unexplained share of the driving signal for which the balance's values are used
 DEGREE = math.pi / 180.0  # rad
@@ -16,13 +20,14 @@ DEGREE = math.pi / 180.0  # rad
 
 @dataclass(frozen=True, eq=False)
 class Balanced:
-    """The driving signal and the columns, the law that balances them, the restoring force, and doubts about the
-    recording."""
+    """The driving signal and the columns, the law that balances them, the restoring force, doubts about the recording,
+    and corrections of it with which alone the law holds."""
 
     rows: Rows
     law: Law
     kind: str
     doubts: tuple[str, ...] = ()
+    corrections: tuple[Correction, ...] = ()
 
     @property
     def explained(self) -> str:
@@ -49,11 +54,11 @@ def balance_of(
     degrees = [_scaled(one, DEGREE) for one in records]
     other = _of_either_sign(degrees, bare, rotary, driver, latest)
     if other.kind == "pendulum" and other.law.left <= UNEXPLAINED and other.law.earns_place(found.law):
-        doubt = (
+        why = (
             f"with the output in degrees (scale: {DEGREE:.9g}) the balance of forces explains {other.explained} of the {driver}, in rad "
-            f"{found.explained}: no unit of it is told, and all values here are those in degrees"
+            f"{found.explained}: no unit of it is told, and degrees are taken"
         )
-        return replace(other, doubts=(doubt, *other.doubts))
+        return replace(other, corrections=(Correction("output", why, DEGREE), *other.corrections))
     if found.kind == "pendulum":
         doubt = f"no unit of the angle is told, and gravity's law of it takes rad: where it is in degrees, give the output  scale: {DEGREE:.9g}"
         return replace(found, doubts=(*found.doubts, doubt))
@@ -75,11 +80,23 @@ def _of_either_sign(
     if turned is None:
         return plain
     found = Balanced(rows.reversed, *turned)
-    doubt = (
+    why = (
         f"with scale: -1 for the {driver} the balance of forces explains {found.explained} of it, as recorded {plain.explained}: its sign "
-        "seems to be opposite to the motion's, and all values here are those of the reversed one"
+        "seems to be opposite to the motion's"
     )
-    return replace(found, doubts=(doubt,))
+    return replace(found, corrections=(Correction(driver, f"{why}, and is turned round here", -1.0),))
+
+
+def sign_note(records: Sequence[Record], units: Units) -> str | None:
+    """A note on a driving signal whose sign is opposite to the motion's; None where it is not, or the records have no
+    balance of forces."""
+    driver = "effort" if records and records[0].effort is not None else "input"
+    bare = Model(Value(1.0, units.mass, False, MASS.bounds), (), units)
+    try:
+        found = _of_either_sign(records, bare, units.position == "rad", driver, LATEST_ACTION)
+    except InputError:
+        return None
+    return found.corrections[0].why.removesuffix(", and is turned round here") if found.corrections else None
 
 
 def _reversed(records: Sequence[Record], rows: Rows, law: Law, rotary: bool) -> tuple[Law, str] | None:

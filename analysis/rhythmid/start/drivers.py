@@ -155,7 +155,7 @@ def _reference(rest: list[Known], output: Recorded, measured: Quantity) -> tuple
             told = follows(ranked[0][1], output)
             why = next(one.meaning.reason for one in able if one.one is ranked[0][1])
             reason = f"a {quantity} that was asked for: {why}"
-            if quantity == measured:
+            if quantity == measured and " follows it " not in why:
                 when = f"{1e3 * abs(told.lag):.3g} ms {'earlier' if told.lag < 0.0 else 'later'}"
                 when = when if told.lag else "at once"
                 reason += f"; the output follows it {when} ({told.correlation:.2f} correlation)"

@@ -15,6 +15,7 @@ from rhythmid.model import INERTIA, MASS, Model
 from rhythmid.record.record import Channel, Record
 from rhythmid.start.balance import LATEST_ACTION, Law, Rows
 from rhythmid.start.balanced import UNEXPLAINED, balance_of, restoring
+from rhythmid.start.correction import Correction, offset_of
 from rhythmid.start.meaning import is_measured_effort, tells_unit
 from rhythmid.start.roles import Roles
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
@@ -30,13 +31,14 @@ LEAST_DAMPING = 0.01
 class Nominal:
     """A model to start with, the reason for its inertia and each of its terms (by label), what could not be
     guessed, and doubts (by label). `explained` is the share of the driving signal that a balance of forces explains, None without
-    one."""
+    one. The values are those of the channels with the `corrections`."""
 
     model: Model
     reasons: dict[str, str]
     remarks: tuple[str, ...]
     doubts: dict[str, str] = field(default_factory=dict)
     explained: float | None = None
+    corrections: tuple[Correction, ...] = ()
 
 
 def nominal_of(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
@@ -75,7 +77,8 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
     few = CHANNELS_APART * max(record.output.period for record in records)
     acts_at_once = driver == "effort" or is_measured_effort(roles.choices[driver].recorded)
     latest = few if acts_at_once else LATEST_ACTION
-    unit_told = tells_unit(roles.choices["output"].recorded)
+    output = roles.choices["output"]
+    unit_told = tells_unit(output.recorded) or output.scale != 1.0
     try:
         found = balance_of(records, _bare(units), roles.rotary, driver, unit_told, latest)
     except InputError as error:
@@ -87,8 +90,9 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
         found_none = "the balance of forces shows no inertia"
         return replace(_by_size(records, units, catalogue, found_none), explained=0.0)
     if law.left > UNEXPLAINED:
-        why = f"the balance of forces explains only {1.0 - law.left:.0%} of what drives"
-        return replace(_by_size(records, units, catalogue, why), explained=1.0 - law.left)
+        share = max(0.0, 1.0 - law.left)
+        why = f"the balance of forces explains {f'only {share:.0%}' if share >= 0.005 else 'nothing'} of what drives, and is not used"
+        return replace(_by_size(records, units, catalogue, why), explained=share)
     told = f"by the balance of forces, which explains {max(0.0, 1.0 - law.left):.0%} of what drives"
     model = _bare(units, _short(inertia))
     reasons = {INERTIA: told}
@@ -101,7 +105,11 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
         reasons["input_delay"] = "the balance is better when what drives acts so much later"
         doubts |= _doubt_of_delay(law.delay, few)
     model, more = _forces(model, law, kind, rows, catalogue)
-    return Nominal(model, reasons | more, tuple(remarks), doubts, 1.0 - law.left)
+    corrections = found.corrections
+    if not corrections and not rows.steady:
+        shifted = offset_of(records, driver, units.force, kind)
+        corrections = () if shifted is None else (shifted,)
+    return Nominal(model, reasons | more, tuple(remarks), doubts, 1.0 - law.left, corrections)
 
 
 def _doubt_of_delay(delay: float, few: float) -> dict[str, str]:

@@ -149,10 +149,29 @@ def follows(command: Recorded, answer: Recorded) -> Follows:
     product = np.fft.irfft(np.fft.rfft(y, length) * np.conj(np.fft.rfft(u, length)), length)
     most = min(int(LATEST_ANSWER / period), len(u) // 4)
     lags = np.concatenate([np.arange(most + 1), np.arange(-most, 0)])
-    best = int(lags[int(np.argmax(np.abs(product[lags])))])
+    strongest = int(lags[int(np.argmax(np.abs(product[lags])))])
+    best = _peak(u, y, strongest, most)
     size = math.sqrt(float(u @ u) * float(y @ y))
     later = max(float(product[: most + 1].max()) / size, 0.0)
-    return Follows(float(product[best]) / size, best * period, float(np.std(y) / np.std(u)), later)
+    return Follows(float(product[strongest]) / size, best * period, float(np.std(y) / np.std(u)), later)
+
+
+def _peak(u: Array, y: Array, lag: int, most: int) -> int:
+    """The lag [samples] of the nearest maximum of the correlation over the samples that both have at it. The product of
+    the whole records favours small lags, which have more samples in common."""
+
+    def alike(lag: int) -> float:
+        early, late = (u[: len(u) - lag], y[lag:]) if lag >= 0 else (u[-lag:], y[: len(y) + lag])
+        size = float(np.std(early) * np.std(late))
+        return (
+            abs(float(np.mean((early - early.mean()) * (late - late.mean())))) / size if size > 0.0 else 0.0
+        )
+
+    best, value = lag, alike(lag)
+    for step in (1, -1):
+        while abs(best + step) <= most and (further := alike(best + step)) > value:
+            best, value = best + step, further
+    return best
 
 
 def coherent(first: Recorded, second: Recorded) -> float:

@@ -17,12 +17,15 @@ CLOSE_WORTH = 0.7  # ratio to the best candidate's score above which the user is
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """The choice for a role, its reason, the alternatives, and doubts about it."""
+    """The choice for a role, its reason, the alternatives, and doubts about it. Its values are `scale` times those of
+    the number, plus `offset`."""
 
     recorded: Recorded
     reason: str
     others: tuple[Recorded, ...] = ()
     doubts: tuple[str, ...] = ()
+    scale: float = 1.0
+    offset: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -31,6 +34,8 @@ class Choice:
             "reason": self.reason,
             "others": [str(one) for one in self.others],
             "doubts": list(self.doubts),
+            "scale": self.scale * self.recorded.scale,
+            "offset": self.offset,
         }
 
 

@@ -18,28 +18,45 @@ from rhythmid.record.record import Record
 from rhythmid.record.rest_at_ends import rests_of, use_line
 from rhythmid.record.signals import Clock, Signals
 from rhythmid.record.standstill import standstill
+from rhythmid.start.correction import corrected
 from rhythmid.start.force_unit import MODELLED
+from rhythmid.start.free_parts import free_parts
 from rhythmid.start.listed_joints import with_listed_joints
 from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.named_joints import with_joints
 from rhythmid.start.no_motion import NoMotionError
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
 from rhythmid.start.other_effort import by_other_effort
-from rhythmid.start.role_choice import Ask
+from rhythmid.start.role_choice import Ask, Choice
 from rhythmid.start.roles import Roles, first_answer, guess_roles
 from rhythmid.start.sides import with_sides
 from rhythmid.start.yaml_text import GUESSED, as_guessed, clock_of, doubt_of_sign, model_yaml, signals_yaml
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
+MOST_CORRECTIONS = 3  # sign, unit and zero of the channels, one after the other
+
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """Content of a source, the guessed roles, the text of signals.yaml, and whether the machine moves in the source."""
+    """Content of a source, the guessed roles, the text of signals.yaml, its clock with the reason, and whether the machine
+    moves in the source."""
 
     inventory: Inventory
     roles: Roles
     signals: str
+    clock: Clock
+    clock_reason: str
     moves: bool = True
+
+    def changed(self, roles: Roles, use: str) -> "Guess":
+        """The guess with other roles, and the line `use` of signals.yaml, empty where there is none."""
+        clock, reason = self.clock, self.clock_reason
+        if self.inventory.is_bag and {*map(_channel, roles.choices.values())} != {
+            *map(_channel, self.roles.choices.values())
+        }:
+            clock, reason = clock_of(self.inventory, roles)
+        text = signals_yaml(self.inventory, roles, _units(roles), clock, reason, use)
+        return replace(self, roles=roles, signals=text, clock=clock, clock_reason=reason)
 
     def to_dict(self) -> dict[str, Any]:
         """The guesses as plain values for JSON."""
@@ -131,8 +148,8 @@ def guess(
         output = roles.choices["output"]
         output = replace(output, doubts=(*output.doubts, *doubts))
         roles = replace(roles, choices={**roles.choices, "output": output})
-        text = signals_yaml(found, roles, _units(roles), clock, reason, use_line(clean))
-    return Guess(found, roles, text, still is None)
+        text = signals_yaml(found, roles, _units(roles), clock, reason, maybe=use_line(clean))
+    return Guess(found, roles, text, clock, reason, still is None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,22 +250,37 @@ def start(
     moving = [one for one in sources if one not in resting]
     known = load_catalogue() if catalogue is None else catalogue
 
-    def tried(roles: Roles) -> Nominal:
-        return _nominal(moving, _text(guessed.inventory, roles), roles, known)
+    use, told = free_parts(sources, Signals.from_text(guessed.signals, GUESSED))
+    if use:
+        guessed = guessed.changed(_doubted(guessed.roles, told), use)
 
-    nominal = _nominal(moving, guessed.signals, guessed.roles, known)
-    roles, nominal = by_other_effort(guessed.inventory, guessed.roles, nominal, tried)
+    def tried(roles: Roles) -> Nominal:
+        changed = guessed if roles is guessed.roles else guessed.changed(roles, use)
+        return _nominal(moving, changed.signals, roles, known)
+
+    roles, nominal = by_other_effort(guessed.inventory, guessed.roles, tried(guessed.roles), tried)
+    for _ in range(MOST_CORRECTIONS):
+        if nominal.corrections:
+            roles = corrected(roles, nominal.corrections)
+            nominal = tried(roles)
     if roles is not guessed.roles:
-        guessed = replace(guessed, roles=roles, signals=_text(guessed.inventory, roles))
+        guessed = guessed.changed(roles, use)
     units = _units(roles)
     text = model_yaml(nominal, guessed.roles, units, units not in (TRANSLATIONAL, ROTATIONAL))
     Model.from_text(text, "model.yaml", known)
     return Start(guessed, nominal, text, remarks)
 
 
-def _text(found: Inventory, roles: Roles) -> str:
-    """signals.yaml of these roles."""
-    return signals_yaml(found, roles, _units(roles), *clock_of(found, roles))
+def _channel(choice: Choice) -> str:
+    return str(choice.recorded)
+
+
+def _doubted(roles: Roles, doubts: Sequence[str]) -> Roles:
+    """The roles with further doubts about the output."""
+    output = roles.choices["output"]
+    return replace(
+        roles, choices={**roles.choices, "output": replace(output, doubts=(*output.doubts, *doubts))}
+    )
 
 
 def _nominal(sources: Sequence[str | Path], signals: str, roles: Roles, catalogue: Catalogue) -> Nominal:

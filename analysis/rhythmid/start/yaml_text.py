@@ -44,9 +44,15 @@ def as_guessed() -> Iterator[None]:
 
 
 def signals_yaml(
-    found: Inventory, roles: Roles, units: Units, clock: Clock, clock_reason: str, use: str | None = None
+    found: Inventory,
+    roles: Roles,
+    units: Units,
+    clock: Clock,
+    clock_reason: str,
+    use: str = "",
+    maybe: str | None = None,
 ) -> str:
-    """The text of signals.yaml; `use` is its line for the useful part of the record, where known."""
+    """The text of signals.yaml; `use` is its line for the free part of the records, `maybe` one that is only suggested."""
     lines = [
         *comment(f"Which channel of {found.path.name} is what. Guessed by `rhythmid init`: look through it and correct what is wrong."),
         "",
@@ -62,7 +68,7 @@ def signals_yaml(
                 *_said(role, choice),
                 *([] if role != "input" else _held_comment(choice.recorded, roles)),
                 *_unit_doubt(choice.recorded, _unit(role, choice.recorded, roles, units)),
-                f"{role}: {_channel(role, choice.recorded, roles, units, found.is_bag)}",
+                f"{role}: {_channel(role, choice, roles, units, found.is_bag)}",
             ]
         elif role == "input" and "effort" not in roles.choices:
             why = "nothing that was recorded drives the machine" + (
@@ -93,7 +99,10 @@ def signals_yaml(
     left = [why for why in found.left_out if not any(why.startswith(f"{one}: ") for one in taken)]
     if left:
         lines += ["", *comment(f"Left out: {_listed(left, LISTED)}.")]
-    lines += ["", *comment("Only a part of the record:"), f"# {use or 'use: [0, 60]':<40}# s"]
+    if use:
+        lines += ["", *comment("Only the part in which the machine moves freely (CHECK), s:"), use]
+    else:
+        lines += ["", *comment("Only a part of the record:"), f"# {maybe or 'use: [0, 60]':<40}# s"]
     return "\n".join(lines) + "\n"
 
 
@@ -171,11 +180,14 @@ def time_of(clock: Clock) -> str:
     return clock.kind
 
 
-def _channel(role: str, one: Recorded, roles: Roles, units: Units, bag: bool) -> str:
+def _channel(role: str, choice: Choice, roles: Roles, units: Units, bag: bool) -> str:
+    one = choice.recorded
     parts = (
         [f"topic: {one.topic}, field: {_quoted(one.field)}"] if bag else [f"column: {_quoted(one.column)}"]
     )
-    parts.append(f"unit: {json.dumps(_unit(role, one, roles, units))}{_scale(one.scale)}")
+    parts.append(f"unit: {json.dumps(_unit(role, one, roles, units))}{_scale(one.scale * choice.scale)}")
+    if choice.offset:
+        parts.append(f"offset: {choice.offset:.10g}")
     if one.sign_bit is not None:
         parts.append(f"sign_bit: {one.sign_bit}")
     if role == "output" and roles.output_kind != "position":

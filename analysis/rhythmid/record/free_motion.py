@@ -1,0 +1,166 @@
+"""Where a motion that nothing recorded drives becomes free: after a rest in which it was held, and after a push by hand.
+
+A free machine with one degree of freedom only loses energy. So it passes through a place more slowly each time, and a
+passage that is faster than the one before shows that something pushed it in between.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from rhythmid.record.record import Record
+
+Array = NDArray[np.float64]
+FIRST = 3  # samples whose median is the place where a motion starts
+AT_REST = 0.02  # share of a motion's distance from its start up to which it has not begun
+HALFWAY = 0.5  # half of that distance
+# least duration of a rest before the motion, relative to the time from the start to half of the distance. A machine
+# released at the first sample stays within a fiftieth for at most a quarter of that time: the parabola of a
+# constant force
+LONG = 1.0
+MOST_SAMPLES = 20_000  # largest number of samples used: the passages are slow
+POWER = 0.99  # share of the motion's power below the frequency that sets the smoothing
+SMOOTHED = 0.125  # length of the smoothing in periods of that frequency: it changes a sine by less than 1 %
+PLACES = 50  # places of two passages at which their speeds are compared
+LEAST_WAY = 0.01  # least way that two passages have in common, as a share of the travel: less is noise
+# least ratio of the squared speeds of a passage and the one before: a smoothed turning point at the end of the record
+# changes it by a tenth
+GAIN = 1.25
+LEAST_GAIN = 0.01  # least increase of the squared speed, as a share of its largest: less is noise
+LEAST_PASSAGES = 2  # passages without a push after the last one, so that the motion is free at all
+
+
+@dataclass(frozen=True)
+class Freed:
+    """The time `begin` [s] from which a motion is free, and the time `until` [s] up to which it was held, or `pushed`
+    at least."""
+
+    begin: float
+    until: float
+    pushed: bool
+
+
+def freed(record: Record) -> Freed | None:
+    """Where a motion becomes free that nothing recorded drives at first; None where it is free or driven from its start.
+
+    After a push it is taken from its fastest point on: a hand may still lead it up to there.
+    """
+    if record.output_kind == "acceleration" or len(record.output) < 4 * FIRST:
+        return None
+    rest = _rest(record)
+    if rest is None and _drives(record, float(record.output.time[-1])):
+        return None
+    since = float(record.output.time[0]) if rest is None else rest
+    position, speed, time = _motion(record, since)
+    if len(time) < PLACES:
+        return None if rest is None else Freed(rest, rest, False)
+    strokes = _strokes(speed)
+    last = _last_push(position, speed, strokes)
+    if last is not None and not _drives(record, float(time[-1])):
+        after = strokes[last + 1]
+        return Freed(_fastest(time, speed, after), float(time[after.start]), True)
+    if rest is None:
+        return None
+    away = strokes[0] if len(strokes) else slice(0, len(time))
+    if record.output_kind == "velocity" and not _turns(speed):  # nothing tells a push from a release
+        begin = _fastest(time, speed, away)
+        return Freed(begin, begin, True)
+    return Freed(rest, rest, False)
+
+
+def _rest(record: Record) -> float | None:
+    """End [s] of the rest with which an output starts that nothing drives until it has moved; None where it moves
+    from its first sample on."""
+    value, time = record.output.value, record.output.time
+    away = np.abs(value - np.median(value[:FIRST]))
+    way = float(away.max())
+    moving = int(np.argmax(away > AT_REST * way)) if way > 0.0 else 0
+    if moving == 0:
+        return None
+    half, rested = float(time[np.argmax(away > HALFWAY * way)]), float(time[moving - 1])
+    if rested - time[0] < LONG * (half - rested) or _drives(record, half):
+        return None
+    return rested
+
+
+def _drives(record: Record, until: float) -> bool:
+    """Whether something that may drive the machine was recorded as other than zero before a time [s]."""
+    if record.forcing is not None or record.forcing_law is not None:
+        return True
+    channels = (record.input, record.effort, record.reference)
+    return any(one is not None and bool(np.any(one.value[one.time <= until])) for one in channels)
+
+
+def _motion(record: Record, since: float) -> tuple[Array, Array, Array]:
+    """Position and speed (n,) of the output from a time [s] on, smoothed, and their times (n,) [s]."""
+    kept = record.output.time >= since
+    time, value = record.output.time[kept], record.output.value[kept]
+    count = min(len(time), MOST_SAMPLES)
+    if count < PLACES:
+        return np.empty(0), np.empty(0), np.empty(0)
+    grid: Array = np.linspace(time[0], time[-1], count)
+    period = float(grid[1] - grid[0])
+    value = np.interp(grid, time, value)
+    power = np.abs(np.fft.rfft((value - value.mean()) * np.hanning(count))) ** 2
+    total = np.cumsum(power)
+    highest = max(int(np.searchsorted(total, POWER * total[-1])), 1) / (count * period)
+    length = min(max(2 * int(0.5 * SMOOTHED / (highest * period)) + 1, 5), 2 * ((count - 1) // 2) - 1)
+    if record.output_kind == "velocity":
+        speed = np.asarray(savgol_filter(value, length, 2), dtype=np.float64)
+        position = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * period])
+        return position, speed, grid
+    speed = np.asarray(savgol_filter(value, length, 2, deriv=1, delta=period), dtype=np.float64)
+    return np.asarray(savgol_filter(value, length, 2), dtype=np.float64), speed, grid
+
+
+def _strokes(speed: Array) -> list[slice]:
+    """Parts of a motion (n,) between its turning points, each with a clear speed."""
+    least = AT_REST * float(np.abs(speed).max())
+    turned = np.flatnonzero(np.diff(np.sign(speed)) != 0) + 1
+    edges = [0, *turned.tolist(), len(speed)]
+    made: list[slice] = []
+    for begin, end in zip(edges[:-1], edges[1:]):
+        clear = np.abs(speed[begin:end]).max() > least
+        if clear and made and np.sign(speed[begin:end].sum()) == np.sign(speed[made[-1]].sum()):
+            made[-1] = slice(made[-1].start, end)
+        elif clear:
+            made.append(slice(begin, end))
+    return made
+
+
+def _last_push(position: Array, speed: Array, strokes: list[slice]) -> int | None:
+    """The last of the first strokes after which the machine passes through the same places faster than in it; None
+    where it does so at no stroke, or again and again."""
+    gains = [_gains(position, speed, one, other) for one, other in zip(strokes, strokes[1:])]
+    if not gains or not gains[0]:
+        return None
+    last = gains.index(False) - 1 if False in gains else len(gains) - 1
+    after = gains[last + 1 :]
+    return last if len(after) >= LEAST_PASSAGES and not any(after) else None
+
+
+def _gains(position: Array, speed: Array, one: slice, other: slice) -> bool:
+    """Whether a stroke is clearly faster than the one before at the places of both."""
+    before, after = position[one], position[other]
+    low, high = max(before.min(), after.min()), min(before.max(), after.max())
+    if high - low < LEAST_WAY * np.ptp(position):
+        return False
+    places = np.linspace(low, high, PLACES)
+    squared = []
+    for part, x in ((one, before), (other, after)):
+        order = np.argsort(x)
+        squared.append(float(np.mean(np.interp(places, x[order], speed[part][order] ** 2))))
+    increase = squared[1] - squared[0]
+    return squared[1] > GAIN * squared[0] and increase > LEAST_GAIN * float(np.max(speed**2))
+
+
+def _fastest(time: Array, speed: Array, part: slice) -> float:
+    """Time [s] of the largest speed in a part."""
+    return float(time[part.start + int(np.argmax(np.abs(speed[part])))])
+
+
+def _turns(speed: Array) -> bool:
+    """Whether a motion clearly changes its direction."""
+    return len(_strokes(speed)) > 1
