@@ -73,7 +73,15 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         idle=not driven,
         changes=_changes(series, model),
         swings=(0.0, 0.0) if driven else swing_frequencies(series),
+        signal=_signal(series),
     )
+
+
+def _signal(series: Sequence[Series]) -> tuple[float, float, float, float]:
+    """Smallest, mean and largest value of the measurement in all series, and its largest standard deviation in one."""
+    every = np.concatenate([one.averaged for one in series])
+    spread = max(float(np.std(one.averaged)) for one in series)
+    return float(every.min()), float(every.mean()), float(every.max()), max(spread, 1e-12)
 
 
 def _changes(series: Sequence[Series], model: Model) -> int:
@@ -91,6 +99,11 @@ def _place(series: Series, motion: Array) -> Array:
     where only the speed is measured."""
     fixed = series.kind == "base_displacement" or series.measured != "velocity"
     return motion if fixed else series.average(displacement(series))
+
+
+def position_of(series: Series) -> Array:
+    """Approximate position (blocks,) of a series, as the model's force elements see it; see `_motion`."""
+    return _motion(series)[0]
 
 
 def _motion(series: Series) -> tuple[Array, Array]:

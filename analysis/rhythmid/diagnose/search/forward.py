@@ -35,6 +35,7 @@ from rhythmid.diagnose.search.refit import (
     under_noise,
     whole_fit,
 )
+from rhythmid.diagnose.search.restoring_force import restoring_force
 from rhythmid.diagnose.search.round import Round, distinct, not_tried, one_round
 from rhythmid.diagnose.search.score_tests import (
     under,
@@ -251,6 +252,14 @@ def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
             break
         task.tell(f"refitting with {', '.join(p.added[-1] for p in proposed)}")
         others, lost = run_trials(proposed, *begun, enough, tell=task.tell)
+        found, failed = better_of([*found, *others]), failed + lost
+    sprung = [
+        one
+        for one in restoring_force(state.current, task.catalogue, here.added)
+        if one.key not in {trial.key for trial in found}
+    ]
+    if sprung:
+        others, lost = run_trials(sprung, *begun, tell=task.tell)
         found, failed = better_of([*found, *others]), failed + lost
     if not state.best.added and not follows_all(task.nominal):
         proposed = from_given(task.nominal, task.given, task.catalogue, here.chi2, task.pool)

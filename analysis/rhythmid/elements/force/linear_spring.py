@@ -22,6 +22,9 @@ ELEMENT = Element(
     size="stiffness",
     starts=lambda s: [{"stiffness": 0.1 * s.stiffness, "rest_length": s.centre}],
     also_known_as=("Hooke spring",),
+    family="stiffness",
+    # where they never yield: for z_y far above the travel
+    special_case_of=("bouc_wen_hysteresis", "elastoplastic_hysteresis"),
     confusable={"cubic_stiffness": "one amplitude only: repeat at another amplitude"},
     reference="Paper, equation (10)",
 )
