@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE
-from rhythmid.diagnose.search.restoring_force import comes_back, is_restored, restoring_force
+from rhythmid.diagnose.search.restoring_force import is_restored, restoring_force
+from rhythmid.elements.candidates import ONE_WAY, candidates
 from rhythmid.identify.descent import WHITE
 from rhythmid.identify.output_error import start_only
+from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.signal import first_order_hold
@@ -38,8 +40,19 @@ def test_a_spring_is_proposed_where_nothing_restores_a_motion_that_comes_back():
 
 
 def test_no_spring_is_proposed_where_the_motion_does_not_come_back():
-    coasting = turning(np.exp(-TIME))
-    assert not comes_back(coasting) and proposed(free(), coasting) == []
+    assert proposed(free(), turning(np.exp(-TIME))) == []
+
+
+def test_a_motion_that_never_comes_back_shows_no_stiffness():
+    """Its position stands for its speed and for the time."""
+    for speed, shown in ((np.exp(-TIME), False), (np.sin(6.0 * TIME), True)):
+        sizes = scales([turning(speed)], free())
+        found = candidates(CATALOGUE, free().setting, sizes)
+        assert sizes.comes_back is shown
+        assert (found.not_tried.get("cubic_stiffness") == ONE_WAY) is not shown
+    held = free().with_element(CATALOGUE["linear_spring"], {"stiffness": 5.0})
+    never = scales([turning(np.exp(-TIME))], held)
+    assert "cubic_stiffness" not in candidates(CATALOGUE, held.setting, never).not_tried
 
 
 @pytest.mark.parametrize(("element", "values"), [

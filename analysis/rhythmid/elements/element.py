@@ -120,6 +120,7 @@ class Scales:
     # record, 1 for a step with which the records begin
     changes: int = OFTEN_ENOUGH
     swings: tuple[float, float] = (0.0, 0.0)  # [Hz] lowest and highest frequency of a free oscillation
+    comes_back: bool = True  # whether the position moves back and forth in some record
     # smallest, mean and largest value and standard deviation of what the sensor measures, where that is not the position of
     # the mass that the forces act on: its speed, or its position beside that relative to a moving base
     signal: tuple[float, float, float, float] | None = None

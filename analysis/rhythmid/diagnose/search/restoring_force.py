@@ -11,14 +11,12 @@ import numpy as np
 from rhythmid.diagnose.search.trial import Proposal, propose
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.output_error import Fit
-from rhythmid.identify.record_scales import position_of, scales
-from rhythmid.identify.series import Series
+from rhythmid.identify.record_scales import scales
 
 SPRING = "linear_spring"
 SHIFT = 1e-2  # share of the motion by which the position is shifted
 # share of that shift's change of speed on a spring that holds the mass in the dominant motion, below which nothing restores it
 HELD = 1e-3
-THERE_AND_BACK = 2.0  # least path length, in units of the travel, of a motion that comes back
 STIFFNESSES = (1.0, 0.2, 0.05)  # first guesses, as shares of the inertia's own stiffness m ω²
 
 
@@ -27,10 +25,11 @@ def restoring_force(fit: Fit, catalogue: Catalogue, added: tuple[str, ...]) -> I
 
     `added` are the labels of the effects that the model has beyond the nominal one.
     """
-    series = fit.run.series
-    if SPRING not in catalogue or not any(map(comes_back, series)) or is_restored(fit):
+    if SPRING not in catalogue or not fit.run.series:
         return
-    sizes = scales(series, fit.model)
+    sizes = scales(fit.run.series, fit.model)
+    if not sizes.comes_back or is_restored(fit):
+        return
     guesses = [{"stiffness": share * sizes.stiffness, "rest_length": sizes.centre} for share in STIFFNESSES]
     yield propose(fit.model, catalogue[SPRING], guesses, added, fit.chi2)
 
@@ -49,9 +48,3 @@ def is_restored(fit: Fit) -> bool:
         if float(np.abs(after[:, 1] - before[:, 1]).max()) > HELD * usual:
             return True
     return False
-
-
-def comes_back(series: Series) -> bool:
-    """Whether the position moves back and forth: its path is at least twice its travel."""
-    position = position_of(series)
-    return float(np.abs(np.diff(position)).sum()) >= THERE_AND_BACK * float(np.ptp(position))
