@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.answer.next_experiment import next_experiment
+from rhythmid.diagnose.answer.own_size import own_sizes
 from rhythmid.diagnose.answer.result import (
     Alternative,
     Curve,
@@ -88,8 +89,10 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
     groups = _indistinguishable(found.fit.model, decision)
     rivals = [one for one in found.trials if _rivals(one, best, groups)]
+    if decision.beside and not any(one.key != best.key for one in rivals):
+        rivals = [one for one in found.trials if _without(one, best, decision.beside)]
     case.tell("choosing the next experiment")
-    needed = decision.verdict != "consistent" and not settled(decision.verdict, groups)
+    needed = decision.verdict != "consistent" and not settled(decision.verdict, groups, bool(decision.beside))
     heldout = {one.key: one.heldout_nrmse for one in contest.hypotheses}
     alternatives = tuple(
         Alternative(
@@ -142,6 +145,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         heldout=held_out_words(case.holdout, f"the last fifth of every {part}"),
         notes=(
             *notes,
+            *own_sizes(decision, fit, result.size_errors),
             *held_out_zero_notes(
                 fit, result.scoring.unseen if case.holdout and not case.budget.spent else ()
             ),
@@ -158,6 +162,12 @@ def _rivals(one: Trial, best: Trial, groups: Sequence[Sequence[str]]) -> bool:
         return True
     names, own = (set(t.names) for t in (one, best))
     return names != own and any(names ^ own <= set(group) for group in groups)
+
+
+def _without(one: Trial, best: Trial, uncertain: Sequence[str]) -> bool:
+    """Whether a trial is the best one without some effects that are too uncertain to be named, or with others in their place."""
+    gone = set(best.names) - set(one.names)
+    return bool(gone) and gone <= set(uncertain) and len(one.added) <= len(best.added)
 
 
 def _delay_told(nominal: Model, fit: Fit, elements: Sequence[str]) -> tuple[str, ...]:
