@@ -17,7 +17,6 @@ from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.case import SEARCHED, Budget
 from rhythmid.diagnose.constants import PRACTICAL
 from rhythmid.diagnose.search.backward import eliminate
-from rhythmid.diagnose.search.limit_law import without_limits
 from rhythmid.diagnose.search.order import in_best_order
 from rhythmid.diagnose.search.proposals import (
     REFITTED,
@@ -268,7 +267,6 @@ def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State
     if not found:
         return state, None
     best, here = state.best, state.here
-    found = without_limits(found, task.series)
     within = max(NEAR, NEAR_SHARE * (here.bic() - found[0].bic()))
     near = [one for one in found if one.bic() - found[0].bic() < within]
     hopeful = [[one] for one in found[len(near) :] if here.bic() - one.bic() > PLAIN][:SECOND]

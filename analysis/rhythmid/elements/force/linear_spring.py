@@ -23,8 +23,7 @@ ELEMENT = Element(
     starts=lambda s: [{"stiffness": 0.1 * s.stiffness, "rest_length": s.centre}],
     also_known_as=("Hooke spring",),
     family="stiffness",
-    # where they never yield or relax: for z_y far above the travel, for τ_m far above the duration
-    special_case_of=("bouc_wen_hysteresis", "elastoplastic_hysteresis", "viscoelastic_relaxation"),
+    special_case_of=("bouc_wen_hysteresis", "elastoplastic_hysteresis"),  # for z_y far above the travel
     confusable={"cubic_stiffness": "one amplitude only: repeat at another amplitude"},
     reference="Paper, equation (10)",
 )
