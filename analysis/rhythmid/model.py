@@ -11,7 +11,7 @@ import yaml
 from pydantic import ConfigDict, TypeAdapter
 
 from rhythmid.document import Node, parse, read
-from rhythmid.elements.candidates import Setting
+from rhythmid.elements.candidates import STIFFNESS, Setting
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.elements.element import SLOTS, Against, Element, Parameter
 from rhythmid.errors import InputError
@@ -127,6 +127,10 @@ class Model:
             frozenset(self.free),
             rotational=self.units.position == "rad",
             controlled=any(term.element.acts == "feedback" for term in self.terms),
+            restored=any(
+                term.element.family == STIFFNESS or term.element.name == "position_control"
+                for term in self.terms
+            ),
         )
 
     def value(self, name: str) -> float:

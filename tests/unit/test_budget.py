@@ -130,6 +130,7 @@ def test_by_motion_a_time_that_is_over_after_the_search_weighs_what_a_verdict_ne
     for one in ("freed values", "mismatch of the nominal model", "small effects"):
         assert one in told
     assert found.next_experiment == MORE_TIME
+    assert found.verdict == "undecided" and "freed values" in found.summary
     assert {one.elements for one in found.hypotheses} >= {(), ("coulomb_friction",)}
 
 

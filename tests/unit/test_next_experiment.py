@@ -8,7 +8,7 @@ import pytest
 from answers import diagnosed
 
 from machines import CATALOGUE, SHORT, hopper, records, search_of
-from rhythmid.diagnose.answer.compose import RIVALS, _rivals
+from rhythmid.diagnose.answer.compose import RIVALS, _rivals, _without
 from rhythmid.diagnose.answer.next_experiment import (
     MORE_FREE,
     NONE_NEEDED_FREE,
@@ -74,6 +74,19 @@ def test_a_rival_is_what_the_records_do_not_tell_from_the_best():
     assert _rivals(far, one, (("coulomb_friction", "quadratic_drag"),))
 
 
+def test_a_rival_of_an_effect_too_uncertain_to_be_named_is_the_model_without_it():
+    series = decay(0.5)
+    rubbing = Model.from_text(PENDULUM).with_element(
+        CATALOGUE["coulomb_friction"], {"force": 5.0, "transition": 1e-3}
+    )
+    both = rubbing.with_element(CATALOGUE["quadratic_drag"], {"coefficient": 0.1})
+    free = Model.from_text(PENDULUM).free
+    slim = search_of(estimate(rubbing, series, names=free), "coulomb_friction").best
+    best = search_of(estimate(both, series, names=free), "coulomb_friction", "quadratic_drag").best
+    assert _without(slim, best, ("quadratic_drag",))
+    assert not _without(best, best, ("quadratic_drag",)) and not _without(slim, best, ("coulomb_friction",))
+
+
 def test_only_a_machine_without_input_is_idle():
     assert scales(decay(0.5), Model.from_text(PENDULUM)).idle
     assert not scales(prepare(records(hopper(), SHORT[2:])), hopper()).idle
@@ -133,6 +146,9 @@ def test_every_experiment_of_the_menu_can_be_built():
 def test_only_names_that_nothing_might_stand_for_need_no_further_experiment(verdict, groups, expected):
     found = replace(diagnosed(verdict, "coulomb_friction", kind="effort"), indistinguishable=groups)
     assert found.settled is expected
+    freed = replace(found, chosen=("coulomb_friction", "inertia.mass"))
+    assert freed.settled is expected
+    assert not replace(found, chosen=("coulomb_friction", "backlash")).settled
 
 
 def test_the_joint_that_needs_an_experiment_most_is_told_and_none_where_all_are_sure():

@@ -92,3 +92,13 @@ def test_a_forcing_that_is_constant_drives_nothing_and_one_that_is_not_does():
     one = forced(1.0, 10.0)
     assert one.driven and not one.commanded
     assert not replace(one, forcing=spline(one.time[:-3], np.ones(len(one.time) - 3))).driven
+
+
+def test_the_reference_of_a_curved_speed_sensor_lies_within_the_speeds_that_it_measured():
+    turning = turning_speed()
+    sizes = scales([turning], hopper())
+    curved = CATALOGUE["sensor_nonlinearity"].within(sizes)
+    speeds = turning.value.min(), turning.value.max()
+    assert curved.parameter("reference").bounds == pytest.approx(speeds)
+    assert all(speeds[0] < guess["reference"] < speeds[1] for guess in curved.first_guesses(sizes))
+    assert sizes.high > 2.0 * speeds[1]

@@ -38,6 +38,28 @@ def test_the_gain_of_a_step_is_told_by_how_fast_the_speed_rises(tmp_path):
     assert start([path]).nominal.model.value("velocity_control.gain") == pytest.approx(1.0 / 0.3, rel=0.3)
 
 
+def steps(scale: float, offset: float) -> dict[str, np.ndarray]:
+    """A drive that is asked for three speeds, and what a sensor of another scale and zero shows of them."""
+    asked = np.repeat([25.0, 50.0, 35.0], 500)
+    speed = np.empty(len(asked))
+    speed[0] = asked[0]
+    for k in range(1, len(asked)):
+        speed[k] = speed[k - 1] + 0.01 * (asked[k - 1] - speed[k - 1]) / 0.2
+    return {"speed_ref": asked, "speed": scale * speed + offset + 0.01 * NOISE}
+
+
+def test_a_reference_and_a_speed_of_unlike_units_get_the_gain_and_the_offset_between_them(tmp_path):
+    model = start([log(tmp_path, **steps(1.08, -6.8))]).nominal.model
+    assert model.value("sensor_gain.gain") == pytest.approx(1.08, rel=0.02)
+    assert model.value("sensor_offset.offset") == pytest.approx(-6.8, rel=0.1)
+    assert model.value("velocity_control.gain") == pytest.approx(1.0 / 0.2, rel=0.3)
+
+
+def test_a_speed_that_settles_at_its_reference_gets_neither_gain_nor_offset(tmp_path):
+    model = start([log(tmp_path, **steps(1.0, 0.0))]).nominal.model
+    assert [term.label for term in model.terms] == ["velocity_control"]
+
+
 @pytest.mark.parametrize(
     "speed", [100.0 + NOISE, 500.0 * RISE + NOISE, -90.0 * RISE], ids=["there", "past it", "from it"]
 )

@@ -38,6 +38,7 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
         "one_law": contest(NOMINAL, law),
         "other_place": contest(NOMINAL, moved),
         "astray": replace(contest(NOMINAL, friction()), follows=0.05),
+        "uncompared": replace(contest(NOMINAL, friction()), uncompared=True),
         "stated": contest(NOMINAL, friction()),
         "partly_left": contest(NOMINAL, friction(0.3), maps={"velocity": predicted(1e-4)}),
         "rivals": contest(NOMINAL, *pair),

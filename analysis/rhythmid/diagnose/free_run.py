@@ -119,8 +119,9 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     if trial.added != found.best.added:
         run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
     nominal = next(one.trial for one in contenders if one.kind == "nominal")
+    uncompared = False
     if case.budget.spent:
-        found = _untried(found, OTHER_KINDS)
+        found, uncompared = _untried(found, OTHER_KINDS), True
     elif chosen.kind != "freed_value":
         weighed = [one.trial for one in contenders]
         case.tell("trying other kinds of explanation")
@@ -131,6 +132,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
             found = _told(found, OTHER_KINDS)
             more = contend(others, seen, rows, step, reach, case.tell)
             found = _weighed(found, [one for one, _ in others], more)
+            uncompared = time_is_up()
         contenders += more
     case.tell("locating what is left")
     began = time.monotonic()
@@ -147,7 +149,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         if not case.budget.spent:
             refitted = refitted_map(nominal, before, nominal_run, seen, rows, step)
     maps = _maps(after, refitted, contenders, rows)
-    contest = _contest(contenders, maps, rows, found, run, sizes, structured)
+    contest = replace(_contest(contenders, maps, rows, found, run, sizes, structured), uncompared=uncompared)
     selection = select(contest)
     if selection.chosen.key != trial.added:
         trial = _trial_of(selection.chosen, contenders)

@@ -42,6 +42,7 @@ def ledger(contest: Contest, detectable: float, size_errors: Mapping[str, float]
         "unnamed": contest.unnamed,
         "follows": contest.follows if math.isfinite(contest.follows) else None,
         "cut_short": contest.cut_short,
+        "uncompared": contest.uncompared,
         "structured": contest.structured,
         "structured_after": contest.structured_after,
         "detectable": detectable,
@@ -94,6 +95,7 @@ def contest_of(data: dict[str, Any]) -> Contest:
         data.get("cut_short", False),
         float(data.get("structured", 0.0)),
         float(data.get("structured_after", 0.0)),
+        data.get("uncompared", False),
     )
 
 

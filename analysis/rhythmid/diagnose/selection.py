@@ -42,6 +42,7 @@ class Contest:
     follows : error on held-out data, as a share of `size`, up to which a model follows the machine; infinite for an effort, whose
         noise may be as large.
     cut_short : whether the budget ended the search before all effects that scored well were tried.
+    uncompared : whether the budget ended before the other kinds of explanation, and laws related to the chosen ones, were compared.
     structured : share of the nominal model's error that is predictable from its own past, hence not noise; 0 for an effort,
         whose noise is coloured by the filter of the balance.
     structured_after : the same for the model with which the search ended; for an effort, the share of the chosen model's error
@@ -59,6 +60,7 @@ class Contest:
     cut_short: bool = False
     structured: float = 0.0
     structured_after: float = 0.0
+    uncompared: bool = False
 
     @property
     def nominal(self) -> Hypothesis:

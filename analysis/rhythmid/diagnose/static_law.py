@@ -38,7 +38,7 @@ def law_of(
     Parameters
     ----------
     element, model : the element, and the model to which it belongs.
-    values, sizes : its parameters and the scales of the records, in SI units (those of the sensor for a sensor element).
+    values, sizes : its parameters and the scales of the records, in SI units.
 
     Returns
     -------
@@ -51,6 +51,7 @@ def law_of(
     if element.kernel is None or element.own or element.history:
         return None
     rng = np.random.default_rng(0)
+    sizes = sizes.seen_in(element.slot)
     width = {"velocity": SPREAD * sizes.velocity, "effort": SPREAD * sizes.effort, "leg": sizes.force}
     drawn = {name: rng.uniform(-half, half, INSTANTS) for name, half in width.items()}
     drawn["position"] = rng.uniform(sizes.low, sizes.high, INSTANTS)

@@ -270,6 +270,7 @@ def decide(
         bool(groups),
         contest.cut_short,
         withheld(contest, selection) / max(contest.unnamed * contest.size, 1e-300),
+        contest.uncompared,
     )
     rule = rule_for(found)
     named = stated if rule.verdict == "missing_physics" else labels

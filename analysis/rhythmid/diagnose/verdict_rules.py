@@ -47,6 +47,7 @@ class Outcome:
     cut_short : whether the budget ended the search before all effects that scored well were tried.
     withheld : rms that one effect removes though it is not accepted, because its gain rests on too few blocks, relative to the smallest size
         of practical importance.
+    uncompared : whether the budget ended before the other kinds of explanation, and related laws, were compared.
     """
 
     kind: Kind
@@ -66,6 +67,7 @@ class Outcome:
     alike: bool
     cut_short: bool = False
     withheld: float = 0.0
+    uncompared: bool = False
 
 
 @dataclass(frozen=True)
@@ -238,6 +240,16 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "undecided",
         "the model does not follow the held-out motion with these effects either",
         lambda found: found.astray,
+    ),
+    VerdictRule(
+        "uncompared",
+        "the budget ended before the other kinds of explanation and the related laws were compared (1)",
+        0.0,
+        "undecided",
+        "the budget ended before freed values, longer delays, other places, free functions and related laws were compared, and one of them may "
+        "explain the records as well",
+        lambda found: float(found.uncompared),
+        tells_family=True,
     ),
     VerdictRule(
         "stated",

@@ -1,14 +1,17 @@
 """Elements that could be missing from a model, with first guesses; and the elements that are not tried, with the
 reasons."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rhythmid.elements.element import OFTEN_ENOUGH, Element, Scales
 from rhythmid.elements.first_guess import NoGuess
 
+STIFFNESS = "stiffness"  # the family of the forces that bring a position back
 IDLE = "no command, forcing or controller drives the machine"
 STEADY = "the drive changes only once in each record, which does not show that its effect changes with time"
+ONE_WAY = "nothing in the model restores the position, and the motion never comes back, so that a force of the position is not told from one of the speed or the time"
 LEVEL = "the drive never changes within a record, which shows no delay, lag or memory on its way"
 
 
@@ -18,7 +21,7 @@ class Setting:
 
     `present` holds its terms as (element, what it acts against); `parameters` and `free` are the names of all and
     of the estimated parameters; `rotational` says whether positions are angles, `controlled` whether a controller
-    closes the loop.
+    closes the loop, `restored` whether a force depends on the position.
     """
 
     present: frozenset[tuple[str, str | None]]
@@ -26,6 +29,7 @@ class Setting:
     free: frozenset[str]
     rotational: bool = False
     controlled: bool = False
+    restored: bool = False
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,11 @@ def _unsuitable(element: Element, setting: Setting, scales: Scales) -> str | Non
         return "it needs a controller in the model"
     if scales.idle and (element.driven or element.slot in ("command", "actuator", "timing")):
         return IDLE
+    turns = (
+        element.rotational and scales.high - scales.low >= 2.0 * math.pi
+    )  # what it does comes back with each turn
+    if element.family == STIFFNESS and not (setting.restored or scales.comes_back or turns):
+        return ONE_WAY
     if (reason := _untold_by_levels(element, setting, scales)) is not None:
         return reason
     if element.displaced_base and not scales.displaced_base:

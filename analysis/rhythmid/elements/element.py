@@ -120,6 +120,17 @@ class Scales:
     # record, 1 for a step with which the records begin
     changes: int = OFTEN_ENOUGH
     swings: tuple[float, float] = (0.0, 0.0)  # [Hz] lowest and highest frequency of a free oscillation
+    comes_back: bool = True  # whether the position moves back and forth in some record
+    # smallest, mean and largest value and standard deviation of what the sensor measures, where that is not the position of
+    # the mass that the forces act on: its speed, or its position beside that relative to a moving base
+    signal: tuple[float, float, float, float] | None = None
+
+    def seen_in(self, slot: Slot) -> "Scales":
+        """The scales for elements of a slot: the position of a sensor element is what the sensor measures."""
+        if slot != "sensor" or self.signal is None:
+            return self
+        low, centre, high, spread = self.signal
+        return replace(self, low=low, centre=centre, high=high, position=spread)
 
     @property
     def force(self) -> float:
@@ -292,7 +303,7 @@ class Element:
         """The element with its parameters' bounds, and its first guesses, narrowed to its `ranges` for these scales."""
         if self.ranges is None:
             return self
-        ranges, propose = self.ranges(scales), self.starts
+        ranges, propose = self.ranges(scales.seen_in(self.slot)), self.starts
 
         def narrowed(parameter: Parameter) -> Parameter:
             (low, high), (least, most) = parameter.bounds, ranges.get(parameter.name, (-inf, inf))
@@ -312,4 +323,5 @@ class Element:
 
         Empty where the motion does not show the effect. Raises NoGuess with the reason where no guess is possible.
         """
-        return self.starts(scales) if self.starts is not None else generic_guesses(self, scales)
+        seen = scales.seen_in(self.slot)
+        return self.starts(seen) if self.starts is not None else generic_guesses(self, seen)

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from rhythmid.elements.element import OFTEN_ENOUGH, Scales
-from rhythmid.identify.series import Series, displacement, dominant_frequency
+from rhythmid.identify.series import Series, displacement, dominant_frequency, record_of
 from rhythmid.identify.swing_frequency import swing_frequencies
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 REST_LENGTH = "linear_spring.rest_length"
+THERE_AND_BACK = 2.0  # least path length, in units of the travel, of a motion that comes back
 NO_SPRING = 1e-4  # share of the inertia's stiffness m ω² below which a spring sets no scale
 
 
@@ -73,7 +74,28 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         idle=not driven,
         changes=_changes(series, model),
         swings=(0.0, 0.0) if driven else swing_frequencies(series),
+        comes_back=_comes_back(series, places),
+        signal=_signal(series),
     )
+
+
+def _comes_back(series: Sequence[Series], places: Sequence[Array]) -> bool:
+    """Whether in some record the path of the position is at least twice its travel."""
+    by_record: dict[str, list[Array]] = {}
+    for one, place in zip(series, places, strict=True):
+        by_record.setdefault(record_of(one), []).append(place)
+    return any(
+        sum(float(np.abs(np.diff(one)).sum()) for one in some)
+        >= THERE_AND_BACK * float(np.ptp(np.concatenate(some)))
+        for some in by_record.values()
+    )
+
+
+def _signal(series: Sequence[Series]) -> tuple[float, float, float, float]:
+    """Smallest, mean and largest value of the measurement in all series, and its largest standard deviation in one."""
+    every = np.concatenate([one.averaged for one in series])
+    spread = max(float(np.std(one.averaged)) for one in series)
+    return float(every.min()), float(every.mean()), float(every.max()), max(spread, 1e-12)
 
 
 def _changes(series: Sequence[Series], model: Model) -> int:

@@ -152,26 +152,31 @@ class Rows:
         both = float(x @ drive)
         return both < 0.0 and 1.0 - both**2 / (float(x @ x) * float(drive @ drive)) < FED_BACK
 
-    def fit(self, names: Sequence[str], delay: float = 0.0) -> Law:
-        """Force balance of these columns; coefficients of acceleration, velocity and position are nonnegative."""
+    def fit(self, names: Sequence[str], delay: float = 0.0, followed: str = "") -> Law:
+        """Force balance of these columns; coefficients of acceleration, velocity and position are nonnegative.
+
+        The coefficient of the column that is `followed` is one, beside those of `names`: the driving signal is a reference.
+        """
         places = [COLUMNS.index(name) for name in names]
         every = max(1, sum(map(len, self.drives)) // MOST_ROWS)
-        sides, matrices = [], []
+        sides, kept = [], []
         for drive, columns, period, margin in zip(
             self.drives, self.columns, self.period, self.margin, strict=True
         ):
             step = round(delay / period)
             rows = np.arange(margin + step, len(drive) - margin, every)
             sides.append(drive[rows - step])
-            matrices.append(columns[rows][:, places])
-        side, matrix = np.concatenate(sides), np.vstack(matrices)
+            kept.append(columns[rows])
+        drives, columns = np.concatenate(sides), np.vstack(kept)
+        side = drives - columns[:, COLUMNS.index(followed)] if followed else drives
+        matrix = columns[:, places]
         size = np.linalg.norm(matrix, axis=0)
         told = size > 0.0
         size[~told] = 1.0
         low = [0.0 if name in POSITIVE else -np.inf for name in names]
         solved = lsq_linear(matrix / size, side, (low, np.inf))
         told &= solved.active_mask == 0  # a coefficient near its bound counts as zero
-        power = float(np.sum((side - (0.0 if self.steady else side.mean())) ** 2)) or 1.0
+        power = float(np.sum((drives - (0.0 if self.steady else drives.mean())) ** 2)) or 1.0
         return Law(
             dict(zip(names, np.where(told, solved.x / size, 0.0).tolist(), strict=True)),
             2.0 * float(solved.cost) / power,

@@ -251,6 +251,8 @@ def _servo(records: Sequence[Record], roles: Roles, units: Units, catalogue: Cat
     else:
         told += f"a balance with the motion, which explains {1.0 - law.left:.0%} of the reference"
     gain = _short(law.coefficients["gain"])
+    model, scaled, doubtful = _scaled(model, law, roles, catalogue)
+    reasons, doubts = reasons | scaled, doubts | doubtful
     if roles.reference_of == "velocity":
         model = model.with_element(catalogue["velocity_control"], {"gain": gain})
         return Nominal(model, reasons | {"velocity_control": told}, (), doubts)
@@ -262,11 +264,33 @@ def _servo(records: Sequence[Record], roles: Roles, units: Units, catalogue: Cat
     return Nominal(model, reasons | {"position_control": told}, (remark,), doubts)
 
 
+def _scaled(
+    model: Model, law: Law, roles: Roles, catalogue: Catalogue
+) -> tuple[Model, dict[str, str], dict[str, str]]:
+    """The model with the gain and the offset between reference and measurement that a balance shows, with reasons and doubts."""
+    if "scale" not in law.coefficients:
+        return model, {}, {}
+    scale, offset = law.coefficients["scale"], law.coefficients["offset"]
+    model = model.with_element(catalogue["sensor_gain"], {"gain": _short(scale)})
+    model = model.with_element(catalogue["sensor_offset"], {"offset": _short(offset)})
+    reasons = {
+        "sensor_gain": "the measurement settles at a multiple of the reference",
+        "sensor_offset": "and at a constant distance from that multiple",
+    }
+    units = [roles.choices[role].recorded.unit for role in ("input", "output") if role in roles.choices]
+    if len(units) == 2 and units[0] == units[1] != "":
+        doubt = f"both are told to be in {units[0]}, so that a load, friction or a wrong scale keeps the machine from its reference"
+        return model, reasons, {"sensor_gain": doubt}
+    return model, reasons, {}
+
+
 def _servo_law(records: Sequence[Record], of: str) -> Law:
     """Gains of  acceleration = k_p (reference − position) − k_d velocity, by size alone where the fit is negative
     or explains almost nothing.
 
-    The balance is solved for the reference: r = x + (a + k_d v) / k_p.
+    The balance is solved for the reference: r = x + (a + k_d v) / k_p. Reference and measurement need not have one unit or one
+    zero: `scale` and `offset` of the measurement y = scale x + offset are among the coefficients where the balance is clearly
+    better with them.
     """
     as_force = [
         replace(one, input_kind="force", reference=None, effort=None, forcing=None) for one in records
@@ -281,15 +305,22 @@ def _servo_law(records: Sequence[Record], of: str) -> Law:
         names = ["acceleration", "velocity", *(["position"] if of == "position" else [])]
         names += [] if rows.steady else ["constant"]  # a constant alone balances a constant reference
         law = rows.fit(names, rows.delay(names))
+        tied = rows.fit([name for name in names if name not in (of, "constant")], law.delay, followed=of)
     except InputError:
         return fallback
-    lag = law.coefficients["velocity"]
+    found, period = law.coefficients, max(rows.period)
+    follows = found[of]  # r = y / scale − offset / scale + …
+    if rows.steady or follows <= 0.0 or not law.earns_place(tied):
+        follows, apart = 1.0, {}
+    else:
+        apart = {"scale": 1.0 / follows, "offset": -found["constant"] / follows}
+    lag = found["velocity"]
     # an inertia that follows within one interval of the filtered motion is not identifiable and would only make the
     # model stiff
-    inertial = max(law.coefficients["acceleration"], lag * max(rows.period))
+    inertial = max(found["acceleration"], lag * period)
     if inertial <= 0.0 or law.left > UNEXPLAINED:
         return replace(fallback, left=law.left)
-    return Law({"gain": 1.0 / inertial, "velocity": lag / inertial}, law.left, law.delay)
+    return Law({"gain": follows / inertial, "velocity": lag / inertial, **apart}, law.left, law.delay)
 
 
 def _alone(records: Sequence[Record], units: Units, catalogue: Catalogue, why: str) -> Nominal:

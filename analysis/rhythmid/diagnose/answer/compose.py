@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.answer.next_experiment import next_experiment
+from rhythmid.diagnose.answer.own_size import own_sizes
 from rhythmid.diagnose.answer.result import (
     Alternative,
     Curve,
@@ -90,11 +91,13 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
     groups = _indistinguishable(found.fit.model, decision)
     rivals = [one for one in found.trials if _rivals(one, best, groups)]
+    if decision.beside and not any(one.key != best.key for one in rivals):
+        rivals = [one for one in found.trials if _without(one, best, decision.beside)]
     case.tell("choosing the next experiment")
     freed = freed_value(case.nominal, fit.model, result.selection.chosen)
     if INPUT_DELAY in fit.names:
         freed = freed or longer_delay(fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY], decision)
-    settles = settled(decision.verdict, groups) or decision.rule == LONGER_DELAY
+    settles = settled(decision.verdict, groups, bool(decision.beside)) or decision.rule == LONGER_DELAY
     needed = decision.verdict != "consistent" and not settles
     heldout = {one.key: one.heldout_nrmse for one in contest.hypotheses}
     alternatives = tuple(
@@ -148,6 +151,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         heldout=held_out_words(case.holdout, f"the last fifth of every {part}"),
         notes=(
             *notes,
+            *own_sizes(decision, fit, result.size_errors),
             *held_out_zero_notes(
                 fit, result.scoring.unseen if case.holdout and not case.budget.spent else ()
             ),
@@ -164,6 +168,12 @@ def _rivals(one: Trial, best: Trial, groups: Sequence[Sequence[str]]) -> bool:
         return True
     names, own = (set(t.names) for t in (one, best))
     return names != own and any(names ^ own <= set(group) for group in groups)
+
+
+def _without(one: Trial, best: Trial, uncertain: Sequence[str]) -> bool:
+    """Whether a trial is the best one without some effects that are too uncertain to be named, or with others in their place."""
+    gone = set(best.names) - set(one.names)
+    return bool(gone) and gone <= set(uncertain) and len(one.added) <= len(best.added)
 
 
 def _delay_told(nominal: Model, fit: Fit) -> tuple[str, ...]:

@@ -126,13 +126,15 @@ def effort_delays(balance: Balance, fitted: Fitted) -> dict:
 def _next_experiment(result: EffortResult) -> str:
     """What to record next."""
     decision = result.decision
-    if settled(decision.verdict, decision.equivalent) or decision.rule == LONGER_DELAY:
+    if settled(decision.verdict, decision.equivalent, bool(decision.beside)) or decision.rule == LONGER_DELAY:
         return (
             "none needed for these records; other speeds, loads and positions would exclude smaller effects"
         )
     if decision.equivalent:
         rivals = "; and ".join(listed(group) for group in decision.equivalent)
         return f"several speeds in both directions, slow reversals and another load: what separates {rivals}"
+    if decision.verdict == "missing_physics":
+        return f"a longer record of more varied motion: what would establish {listed(decision.beside)}, or rule it out"
     left = decision.unexplained
     if left.further:
         return f"a longer record of more varied motion: what would establish {listed(left.further)}, or rule it out"

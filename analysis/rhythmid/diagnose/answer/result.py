@@ -139,9 +139,10 @@ class Untried:
     reason: str
 
 
-def settled(verdict: Verdict, indistinguishable: tuple[tuple[str, ...], ...]) -> bool:
-    """Whether an answer needs no further record: it names effects, and no other names explain the records as well."""
-    return verdict == "missing_physics" and not indistinguishable
+def settled(verdict: Verdict, indistinguishable: tuple[tuple[str, ...], ...], unnamed: bool) -> bool:
+    """Whether an answer needs no further record: it names effects, no other names explain the records as well, and the chosen
+    hypothesis has no effects that are too uncertain to be named (`unnamed`)."""
+    return verdict == "missing_physics" and not indistinguishable and not unnamed
 
 
 @dataclass(frozen=True)
@@ -189,7 +190,8 @@ class Diagnosis:
     @property
     def settled(self) -> bool:
         """Whether the answer needs no further record."""
-        return settled(self.verdict, self.indistinguishable)
+        effects = [label for label in self.chosen if "." not in label]  # a freed value is no effect
+        return settled(self.verdict, self.indistinguishable, len(effects) > len(self.missing))
 
     def to_dict(self) -> dict[str, Any]:
         """The diagnosis as plain JSON data; a number that is not finite is null."""

@@ -155,4 +155,4 @@ def _starts_for(
     if scored:
         return [one.start for one in scored[:count]]
     element = catalogue[name]
-    return [dict(s) for s in element.starts(scales(series, model))][:count] if element.starts else []
+    return [dict(s) for s in element.first_guesses(scales(series, model))][:count] if element.starts else []

@@ -35,10 +35,9 @@ from rhythmid.diagnose.search.refit import (
     under_noise,
     whole_fit,
 )
+from rhythmid.diagnose.search.restoring_force import restoring_force
 from rhythmid.diagnose.search.round import Round, distinct, not_tried, one_round
-from rhythmid.diagnose.search.score_tests import (
-    under,
-)
+from rhythmid.diagnose.search.score_tests import under
 from rhythmid.diagnose.search.trial import Origin, Trial
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.noise import NoiseModel
@@ -60,12 +59,9 @@ GROUPS = 3  # groups of elements that are refitted in turn for the first effect 
 # best one's gain. A noise model coloured by the missing effect can rank a surrogate first by as much (Silverbox: a ripple before the
 # cubic spring by 0.15 % of the gain)
 NEAR, NEAR_SHARE = 60.0, 0.01
-# gain in the criterion from which further models are examined if the better ones fail under the noise that they leave, and the
-# number of such models
+# gain in the criterion from which further models are examined if the better ones fail under their noise, and their number
 PLAIN, SECOND = 100.0, 2
-UNDERSTATED = (
-    0.1  # smallest ratio of a score to the gain of the refit, for an effect far from its first guess
-)
+UNDERSTATED = 0.1  # smallest ratio of a score to the gain of the refit, far from the first guess
 EFFECTS_AT_ONCE = 3  # largest number of effects
 RIVALS_COMPARED = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise left by the best model of the previous one
@@ -93,7 +89,7 @@ class Search:
 
 @dataclass(frozen=True)
 class _Task:
-    """Input of all rounds of a search; `floor` is the smallest standard deviation of a noise model, in the output's unit."""
+    """Input of all rounds of a search; `floor` is the smallest standard deviation of a noise model."""
 
     series: Sequence[Series]
     nominal: Fit
@@ -244,7 +240,7 @@ def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
     count = refitted(now, REFITTED if not state.best.added else REFITTED - 1)
     begun = task.series, Origin.of(here), here.noise, task.step
     found, failed = [], []
-    # if none improves on the nominal model, try the next group: the linear scores may overrate a family of related elements
+    # if none improves on the nominal model, the next group: linear scores may overrate a family
     for first in range(0, count * (1 if state.best.added else GROUPS), count):
         proposed, enough = proposals(here.model, now, count, here.chi2, first)
         if any(one.chi2 < here.chi2 for one in found) or not proposed:
@@ -252,13 +248,17 @@ def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
         task.tell(f"refitting with {', '.join(p.added[-1] for p in proposed)}")
         others, lost = run_trials(proposed, *begun, enough, tell=task.tell)
         found, failed = better_of([*found, *others]), failed + lost
+    known = {trial.key for trial in found}
+    untold = [
+        one for one in restoring_force(state.current, task.catalogue, here.added) if one.key not in known
+    ]
     if not state.best.added and not follows_all(task.nominal):
-        proposed = from_given(task.nominal, task.given, task.catalogue, here.chi2, task.pool)
-        others, lost = run_trials(proposed, *begun, tell=task.tell)
+        untold += from_given(task.nominal, task.given, task.catalogue, here.chi2, task.pool)
+    if untold:
+        others, lost = run_trials(untold, *begun, tell=task.tell)
         found, failed = better_of([*found, *others]), failed + lost
-    found = [
-        one for one in found if one.chi2 < here.chi2
-    ]  # a richer model with a worse fit has ended in a bad minimum
+    # a richer model with a worse fit has ended in a bad minimum
+    found = [one for one in found if one.chi2 < here.chi2]
     return state.without(failed).with_trials(found), found
 
 

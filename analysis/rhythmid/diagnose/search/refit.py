@@ -212,7 +212,7 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
         flat = _flat(trial.model, trial.differences[0], names)
         if not flat or element.starts is None:
             continue
-        guesses = element.starts(scales(series, trial.model))
+        guesses = element.first_guesses(scales(series, trial.model))
         known = {tuple(guess[name.rpartition(".")[2]] for name in flat) for guess in guesses}
         run = _run_of(trial, series, trial.noise, max_step)
         free = tuple(trial.model.free)

@@ -22,6 +22,8 @@ ELEMENT = Element(
     size="stiffness",
     starts=lambda s: [{"stiffness": 0.1 * s.stiffness, "rest_length": s.centre}],
     also_known_as=("Hooke spring",),
+    family="stiffness",
+    special_case_of=("bouc_wen_hysteresis", "elastoplastic_hysteresis"),  # for z_y far above the travel
     confusable={"cubic_stiffness": "one amplitude only: repeat at another amplitude"},
     reference="Paper, equation (10)",
 )

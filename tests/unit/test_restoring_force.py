@@ -1,0 +1,64 @@
+"""A linear restoring force is a hypothesis wherever the nominal model has none, although no score shows it there."""
+
+import numpy as np
+import pytest
+
+from machines import CATALOGUE
+from rhythmid.diagnose.search.restoring_force import is_restored, restoring_force
+from rhythmid.elements.candidates import ONE_WAY, candidates
+from rhythmid.identify.descent import WHITE
+from rhythmid.identify.output_error import start_only
+from rhythmid.identify.record_scales import scales
+from rhythmid.identify.series import Series
+from rhythmid.model import Model
+from rhythmid.simulation.signal import first_order_hold
+
+FREE = """
+inertia: {mass: {value: 1.0, unit: kg}}
+force: [{viscous_damper: {damping: {value: 1.0, unit: N*s/m}}}]
+"""
+TIME = 5e-3 * np.arange(2000)
+
+
+def turning(speed: np.ndarray) -> Series:
+    """A record of the speed of a machine that is pushed to and fro."""
+    push = first_order_hold(TIME, np.sin(6.0 * TIME))
+    return Series("made", TIME, speed, push, None, 1, np.ones(len(TIME), bool), 5e-3, measured="velocity")
+
+
+def proposed(model: Model, series: Series) -> list[tuple[str, ...]]:
+    """What is proposed beside a fit that has the labels of no effect."""
+    return [one.added for one in restoring_force(start_only(model, [series], WHITE, 5e-3), CATALOGUE, ())]
+
+
+def free() -> Model:
+    return Model.from_text(FREE, catalogue=CATALOGUE)
+
+
+def test_a_spring_is_proposed_where_nothing_restores_a_motion_that_comes_back():
+    assert proposed(free(), turning(np.sin(6.0 * TIME))) == [("linear_spring",)]
+
+
+def test_no_spring_is_proposed_where_the_motion_does_not_come_back():
+    assert proposed(free(), turning(np.exp(-TIME))) == []
+
+
+def test_a_motion_that_never_comes_back_shows_no_stiffness():
+    """Its position stands for its speed and for the time."""
+    for speed, shown in ((np.exp(-TIME), False), (np.sin(6.0 * TIME), True)):
+        sizes = scales([turning(speed)], free())
+        found = candidates(CATALOGUE, free().setting, sizes)
+        assert sizes.comes_back is shown
+        assert (found.not_tried.get("cubic_stiffness") == ONE_WAY) is not shown
+    held = free().with_element(CATALOGUE["linear_spring"], {"stiffness": 5.0})
+    never = scales([turning(np.exp(-TIME))], held)
+    assert "cubic_stiffness" not in candidates(CATALOGUE, held.setting, never).not_tried
+
+
+@pytest.mark.parametrize(("element", "values"), [
+    ("pendulum_gravity", {"moment": 5.0, "reference": 0.0}), ("cubic_stiffness", {"coefficient": 5.0}),
+])  # fmt: skip
+def test_no_spring_is_proposed_where_a_force_depends_on_the_position(element, values):
+    held = free().with_element(CATALOGUE[element], values)
+    series = turning(np.sin(6.0 * TIME))
+    assert is_restored(start_only(held, [series], WHITE, 5e-3)) and proposed(held, series) == []
