@@ -2,6 +2,7 @@
 
 import math
 import shutil
+from collections.abc import Iterable
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -20,6 +21,18 @@ READERS = {
     "diagnose": ("diagnose", "--model", str(MODEL)),
 }
 SECOND = 1_000_000_000
+
+
+def in_turn(cases: Iterable[str]) -> list[tuple[str, str]]:
+    """(reader, case): the first case with all readers, each other one with one of them in turn, as they read a file by one function."""
+    first, *others = cases
+    readers = list(READERS)
+    return [
+        *((reader, first) for reader in readers),
+        *((readers[i % len(readers)], one) for i, one in enumerate(others)),
+    ]
+
+
 Y, U = "joint_states", "excitation"
 
 
@@ -151,8 +164,7 @@ NO_RECORDINGS = {
 }
 
 
-@pytest.mark.parametrize("reader", READERS)
-@pytest.mark.parametrize("name", NO_RECORDINGS)
+@pytest.mark.parametrize(("reader", "name"), in_turn(NO_RECORDINGS))
 def test_what_is_no_recording_of_a_machine_is_refused_with_one_line(reader, name, tmp_path, refused):
     make, words = NO_RECORDINGS[name]
     make(tmp_path)
@@ -191,8 +203,7 @@ SIGNALS = {
 }
 
 
-@pytest.mark.parametrize("reader", READERS)
-@pytest.mark.parametrize("text", SIGNALS)
+@pytest.mark.parametrize(("reader", "text"), in_turn(SIGNALS))
 def test_a_wrong_signals_file_is_refused_with_one_line(reader, text, topics, bag, refused, tmp_path):
     (tmp_path / "signals.yaml").write_text(text)
     assert SIGNALS[text] in refused(*READERS[reader], bag(topics), "--signals", "signals.yaml")

@@ -140,7 +140,8 @@ def test_a_result_that_cannot_be_put_in_its_place_leaves_nothing(tmp_path):
 
 def test_a_campaign_that_is_ended_by_a_signal_leaves_no_worker(tmp_path):
     process = subprocess.Popen(
-        [sys.executable, "-m", "rhythmid.cli", "proof", "--kind", "null", "--cases", "2", "--out", str(tmp_path / "out")],
+        [sys.executable, "-m", "rhythmid.cli", "proof", "--kind", "null", "--machine", "decay", "--cases", "2",
+         "--out", str(tmp_path / "out")],
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     assert process.stderr is not None

@@ -2,7 +2,8 @@
 
 Rates are measured by campaigns (`rhythmid proof`, docs/proof.md); these cases show that what a campaign does is done, and
 that what it found of them still holds: clean machines with one effect, cluttered ones with none, and cluttered ones
-whose effect the catalogue lacks. Of each kind those run always whose diagnosis takes seconds, and the others with `make test-long`.
+whose effect the catalogue lacks. Those run always whose diagnosis takes seconds, and the others with `make test-long`.
+That the catalogue may lack a law is in tests/unit/test_history_map.py and tests/unit/test_effort_search.py, too.
 """
 
 from pathlib import Path
@@ -16,12 +17,11 @@ from rhythmid.proof.score import Score
 SHORT = [
     Task(60403, "single", 0, "pendulum"),
     Task(60402, "null", 0, "servo", cluttered=True),
-    Task(60405, "left-out", 0, "axis", cluttered=True),
 ]
 LONG = [
     *(Task(60403, "single", 0, design) for design in ("hopper", "servo", "axis", "joint")),
     *(Task(60402, "null", 0, design, cluttered=True) for design in ("pendulum", "motor")),
-    Task(60405, "left-out", 1, "axis", cluttered=True),
+    *(Task(60405, "left-out", index, "axis", cluttered=True) for index in (0, 1)),
     Task(120405, "left-out", 2, "axis", cluttered=True),
 ]
 
@@ -65,7 +65,10 @@ def test_where_nothing_is_concealed_nothing_is_claimed(scores):
 
 
 def test_what_the_catalogue_lacks_gets_no_confident_name(scores):
-    assert [(one.case, one.true, one.named) for one in _of(scores, "left-out") if not one.honest] == []
+    lacking = _of(scores, "left-out")
+    if not lacking:
+        pytest.skip("there is none among the short cases")
+    assert [(one.case, one.true, one.named) for one in lacking if not one.honest] == []
 
 
 def test_named_effects_bring_the_held_out_error_down_to_the_noise(scores):

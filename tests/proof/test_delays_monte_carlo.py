@@ -14,7 +14,7 @@ TRUTH = {
     "linear_spring.stiffness": 200.0,
     "switched_damper.stance": 2.0,
 }
-SPEC = {"type": "chirp", "amplitude": 0.02, "band": [0, 7], "sweep": 15.0}
+SPEC = {"type": "chirp", "amplitude": 0.02, "band": [0, 7], "sweep": 8.0}
 NOISE = 2e-5
 RUNS = 40
 

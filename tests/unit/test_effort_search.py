@@ -111,7 +111,7 @@ def test_of_laws_of_which_one_contains_the_other_one_stands_alone(friction):
 
 
 def test_a_friction_that_grows_with_the_load_is_found_beside_one_that_does_not():
-    record = axis(gravity=4.0, amplitude=4.0, load=0.3)
+    record = axis(gravity=4.0, amplitude=4.0, load=0.3, length=10.0)
     weight = "force: [{pendulum_gravity: {moment: {value: 3.0, unit: N*m}}}, "
     model = Model.from_text(
         "inertia: {mass: {value: 1.3, unit: kg*m^2}}\n"
@@ -135,13 +135,13 @@ def test_nothing_is_found_where_nothing_is_missing():
         search_effort(
             [axis(seed, friction=0.0, jitter=0.3, length=10.0)], axis_model(), CATALOGUE
         ).chosen.elements
-        for seed in range(8)
+        for seed in range(3)
     ]
-    assert found == [()] * 8
+    assert found == [()] * 3
 
 
 def test_gravity_and_effort_do_not_extinguish_each_other():
-    found = search_effort([axis(gravity=4.0, amplitude=4.0)], arm_model(), CATALOGUE)
+    found = search_effort([axis(gravity=4.0, amplitude=4.0, length=10.0)], arm_model(), CATALOGUE)
     assert set(found.chosen.elements) == {"pendulum_gravity", "coulomb_friction"}
     assert found.chosen.model.value("pendulum_gravity.moment") == pytest.approx(4.0, rel=0.03)
     predicted = found.balance.predicted(found.chosen.fit.model, found.chosen.fit.alignment)
@@ -191,7 +191,7 @@ def test_dry_friction_of_a_frame_on_a_moving_base_is_named():
 
 def test_a_law_that_the_catalogue_lacks_is_predicted_by_the_map():
     short = CATALOGUE.without(*(name for name, one in CATALOGUE.items() if one.family == "friction"))
-    found = search_effort([axis()], axis_model(), short)
+    found = search_effort([axis(length=10.0)], axis_model(), short)
     best, unknown = np.sqrt(errors_of(found, found.chosen))
     assert best > 2.0 * unknown and unknown < 0.03 * variation_of(found.balance)
 

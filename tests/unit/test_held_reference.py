@@ -48,7 +48,7 @@ def leads(machine: Machine, record: JointRecord) -> Mapping[str, float]:
     return likely_readings(balances_of(machine, [record]), [record])[0].leads
 
 
-@pytest.mark.parametrize("rate", [500, 1000])
+@pytest.mark.parametrize("rate", [500, pytest.param(1000, marks=pytest.mark.long)])
 def test_the_shipped_leg_comes_out_as_it_is(tmp_path: Path, rate: int):
     found = identify_machine(shipped(tmp_path, leg(), rate), leg())
     for joint in ("hip", "knee"):

@@ -6,15 +6,19 @@ from legged import MODELS, hop, recorded
 
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
-from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
+
+LAWS = ("viscous_damper", "coulomb_friction", "constant_force", "actuator_gain", "linear_spring")
 
 
 def test_a_links_wrong_mass_has_the_share_and_the_probability_that_the_evidence_gives_it():
     machine = Machine.load(MODELS / "leg.yaml")
     heavier = machine.with_inertial({"shank.mass": 1.5 * machine.body.parameters["shank.mass"]})
-    time, rng = np.arange(0.0, 5.0, 0.002), np.random.default_rng(1)
+    time, rng = np.arange(0.0, 4.0, 0.002), np.random.default_rng(1)
     record = recorded(heavier, hop(time, rng), time, rng)
-    found = diagnose_machine([record], machine).diagnosis
+    known = load_catalogue()
+    few = Catalogue({name: known[name] for name in LAWS})
+    found = diagnose_machine([record], machine, catalogue=few).diagnosis
     (one,) = [effect for effect in found.missing if effect.element == "link_mass"]
     assert one.link == "shank" and one.joint == "knee"
     assert one.parameters["mass"].value == pytest.approx(heavier.body.parameters["shank.mass"], rel=0.1)

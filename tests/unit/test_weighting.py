@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import rhythmid as rh
+from rhythmid.identify.identifiability import delays_of
 from rhythmid.identify.identify import paper_hopper
-from rhythmid.identify.joint import best_fit
+from rhythmid.identify.joint import JointFit, best_fit
 from rhythmid.identify.output_error import MISLED, Fit, minimise, noise_of
 from rhythmid.identify.robust_covariance import with_robust_covariance
 from rhythmid.identify.weighting import efficient_fit
@@ -34,9 +35,14 @@ def recorded(seed: int, held: float) -> Record:
 
 
 @cache
+def identified(seed: int, held: float) -> JointFit:
+    """What is found from such a record."""
+    return best_fit(recorded(seed, held), paper_hopper())
+
+
 def given_of(seed: int, held: float) -> Fit:
     """The fit that is given for such a record."""
-    return best_fit(recorded(seed, held), paper_hopper()).fit
+    return identified(seed, held).fit
 
 
 @cache
@@ -73,5 +79,5 @@ def test_a_fit_whose_weights_give_up_the_motion_is_not_given(seed: int) -> None:
 
 
 def test_limit_cycle_and_response_are_not_said_to_disagree_where_measurements_come_in_bursts() -> None:
-    closure = rh.identify(recorded(1, 0.06), paper_hopper()).delays.closure
+    closure = delays_of(identified(1, 0.06)).closure
     assert closure is not None and abs(closure) < 3.0  # -5.4 by the information alone
