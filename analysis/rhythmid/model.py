@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
@@ -105,7 +106,7 @@ class Model:
         """The model in a document, or in a part of one."""
         return _model(document, load_catalogue() if catalogue is None else catalogue)
 
-    @property
+    @cached_property
     def parameters(self) -> dict[str, Value]:
         """All parameters, by "label.parameter"; the inertia is "inertia.mass"."""
         found = {INERTIA: self.mass}

@@ -22,6 +22,11 @@ def reduced(unit: str) -> str:
     return ("*".join(over) or "1") + (f"/({below})" if len(under) > 1 else f"/{below}" if under else "")
 
 
+def is_product(unit: str) -> bool:
+    """Whether a text is a product of powers of names."""
+    return _powers(unit) is not None
+
+
 def _power(name: str, power: int) -> str:
     return name if power == 1 else f"{name}^{power}"
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from rhythmid.errors import InputError
 from rhythmid.record.heading import NOT_SI
-from rhythmid.unit_powers import reduced
+from rhythmid.unit_powers import is_product, reduced
 
 
 @lru_cache(maxsize=1)
@@ -78,6 +78,11 @@ def multiple_of_si(unit: str) -> tuple[float, str] | None:
     """
     found = NOT_SI.get(unit)
     return None if found is None or found[1] == "1" else found
+
+
+def is_readable(unit: str) -> bool:
+    """Whether a text can be a unit: a product of powers of names, of which any may be a machine's own (px, duty, inH2O)."""
+    return is_product(re.sub(r"(?<=[^\W\d_])-?\d+", "", _plain(unit)))
 
 
 TRANSLATIONAL = Units()

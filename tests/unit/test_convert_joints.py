@@ -74,3 +74,17 @@ def test_without_signals_all_joints_that_are_guessed_are_written(table):
 
 def test_one_joint_is_written_where_its_name_is_given(table):
     assert "joints (" not in converted(table, "--joint", "bend")
+
+
+def test_one_signals_file_reads_the_bags_of_several_tables(table):
+    own = str(table.parent / "signals.yaml")
+    again = table.rename(table.parent / "again.csv")
+    table.write_bytes(again.read_bytes())
+    converted(table, "--signals", own)
+    (table.parent / "bag").rename(table.parent / "first")
+    converted(again, "--signals", own)
+    bags = [table.parent / "first", table.parent / "bag"]
+    records = load_joint_records(bags, table.parent / "first" / "signals.yaml")
+    assert [len(one.joints) for one in records] == [2, 2]
+    units = {one.channels["effort"].unit for record in records for one in record.joints.values()}
+    assert units == {"N*m"}

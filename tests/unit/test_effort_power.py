@@ -7,10 +7,11 @@ import pytest
 from answers import diagnosed
 from legged import fixed_leg, recorded, references
 
+from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import FitQuality
 from rhythmid.diagnose.joints.misfit import misfits
-from rhythmid.identify.joints.effort_power import braking_note
+from rhythmid.identify.joints.effort_power import BRAKES, braking_note
 from rhythmid.identify.joints.joint_identification import identify_machine
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
@@ -57,6 +58,23 @@ def test_identify_tells_it_and_that_the_damping_ends_at_its_bound(leg: tuple[Mac
     assert [
         note for note in found.notes if "knee.viscous_damper.damping" in note and "ends at the bound" in note
     ]
+
+
+def test_a_load_that_the_file_lacks_is_no_effort_that_falls_with_the_speed(leg: tuple[Machine, JointRecord]):
+    """A weight returns what it takes only where the motion does: here rows are kept in which it brakes."""
+    machine, record = leg
+    balances = JointBalances.of(machine, [record])
+    whole, model = balances.balance("knee"), balances.models["knee"]
+    link = next(name for name in machine.body.ends if machine.body.joint_of(name) == "knee")
+    weight = whole.rows(one.links[f"{BODY}.{link}.payload"][1] for one in whole.motions)
+    moved = whole.rows(model.mass.value * one.acceleration + one.coupling for one in whole.motions)
+    kept = weight * whole.mechanical[:, 1] < 0.0
+    parts = np.split(kept, np.cumsum([len(one) for one in whole.places])[:-1])
+    places = tuple(one[part] for one, part in zip(whole.places, parts, strict=True))
+    carried = replace(whole, places=places, record=whole.record[kept], measured=(moved + 2.0 * weight)[kept])
+    beyond, speed = 2.0 * weight[kept], carried.mechanical[:, 1]
+    assert np.mean(beyond * speed) < BRAKES * np.sqrt(np.mean(beyond**2) * np.mean(speed**2))
+    assert braking_note("knee", carried, model, True) is None
 
 
 def test_a_diagnosis_says_it_instead_of_blaming_the_body():

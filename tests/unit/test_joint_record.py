@@ -108,6 +108,20 @@ def test_a_scale_by_joint_goes_by_the_models_names_where_the_recording_has_other
         np.testing.assert_allclose(one.effort.value, effort * MOTION[:, column])
 
 
+def test_a_list_has_the_column_of_each_joint_and_a_star_in_a_unit_is_no_joint(tmp_path: Path):
+    np.savetxt(
+        tmp_path / "run.csv", np.column_stack([TIME, MOTION[:, :2], MOTION[:, :2] + 0.1]), delimiter=","
+    )
+    text = "joints: [hip, knee]\ntime: {column: 0}\noutput: {column: [2, 1]}\neffort: {column: [3, 4], unit: N*m}\n"
+    (tmp_path / "signals.yaml").write_text(text)
+    (found,) = load_joint_records([tmp_path / "run.csv"], tmp_path / "signals.yaml")
+    np.testing.assert_allclose(found.joints["hip"].output.value, MOTION[:, 1], atol=1e-12)
+    np.testing.assert_allclose(found.joints["knee"].output.value, MOTION[:, 0], atol=1e-12)
+    assert found.joints["knee"].channels["effort"].unit == "N*m"
+    with pytest.raises(InputError, match="lists 1 columns of 2 joints; give each joint one"):
+        JointSignals.from_text(text.replace("[2, 1]", "[2]"))
+
+
 def test_check_tells_by_joint_what_no_analysis_will_use(tmp_path):
     time = np.round(0.001 * np.arange(4000), 6)
     slow = np.sin(5.0 * (np.arange(4000) // 10 * 0.01))  # the sensor measures every tenth row

@@ -173,6 +173,112 @@ def test_of_several_efforts_the_one_that_was_measured_is_taken_and_the_others_ar
     assert any("what the actuators were asked for" in line for line in found.lines())
 
 
+def test_a_part_of_a_joints_name_says_nothing_of_its_references(tmp_path, robot, run):
+    robot.write_text(ARM.replace("shoulder_joint", "axis_a").replace("elbow_joint", "axis_b"))
+    for named in ("{}_{}", "{1}_{0}"):  # the letter of an acceleration is in both
+        heads = [named.format(kind, joint) for kind in ("target", "pos") for joint in ("axis_a", "axis_b")]
+        found = begun(table(tmp_path / "run.csv", run, heads, "asked", "position"), robot)
+        column = named.format("target", "*")
+        assert f'input: {{column: "{column}", kind: reference' in found.signals
+
+
+def test_positions_that_the_measured_ones_follow_are_references_with_a_check(tmp_path, robot, run):
+    heads = ["Position1", "Position2", "tau1", "tau2", "PositionPlan1", "PositionPlan2"]
+    found = begun(table(tmp_path / "run.csv", run, heads, "position", "effort", "asked"), robot)
+    assert 'input: {column: "PositionPlan*", kind: reference' in found.signals
+    assert "# CHECK input: no name says that PositionPlan* was asked for" in found.signals
+    damaged = {**run, "asked": np.where(run["time"][:, None] == run["time"][9], 1e120, run["asked"])}
+    found = begun(table(tmp_path / "run.csv", damaged, heads, "position", "effort", "asked"), robot)
+    assert "input:" not in found.signals.replace("CHECK input:", "")
+    assert any("it is not used, because PositionPlan1" in line for line in found.doubts)
+
+
+def test_a_torque_comes_before_a_current_by_any_of_its_words(tmp_path, robot, run):
+    heads = ["Position1", "Position2", "Cur1", "Cur2", "TorqueCur1", "TorqueCur2"]
+    found = begun(table(tmp_path / "run.csv", run, heads, "position", "effort", "effort"), robot)
+    assert 'effort: {column: "TorqueCur*"' in found.signals
+    found = begun(table(tmp_path / "run.csv", run, heads[:4], "position", "effort"), robot)
+    assert "# CHECK effort: Cur* is called a current" in found.signals
+
+
+def test_gains_are_estimated_where_reference_position_and_effort_were_recorded(tmp_path, robot, run):
+    heads = [f"{kind}{joint}" for kind in ("ref", "q", "tau") for joint in (1, 2)]
+    found = begun(table(tmp_path / "run.csv", run, heads, "asked", "position", "effort"), robot)
+    machine = Machine.from_text(found.model.replace("../", ""), tmp_path, load_catalogue())
+    for joint in ("shoulder_joint", "elbow_joint"):
+        path = machine.paths[joint]
+        assert path.value("position_control.proportional") == pytest.approx(60.0, rel=0.05)
+        assert path.value("position_control.derivative") == pytest.approx(4.0, rel=0.1)
+    assert "CHECK position_control: gains by least squares" in found.model
+
+
+def test_the_friction_of_the_robots_file_is_written_into_the_model(tmp_path, robot, run):
+    losses = '<dynamics damping="0.2" friction="0.7"/>'
+    robot.write_text(
+        ARM.replace(
+            '<joint name="elbow_joint" type="revolute">',
+            f'<joint name="elbow_joint" type="revolute">{losses}',
+        )
+    )
+    found = begun(table(tmp_path / "run.csv", run, ["q1", "q2", "tau1", "tau2"], "position", "effort"), robot)
+    assert "viscous_damper: {damping: 0.2}}, {coulomb_friction: {force: 0.7" in found.model
+
+
+def test_columns_without_names_are_told_by_groups_of_one_column_for_each_joint(tmp_path, robot, run):
+    speed = np.gradient(run["position"], run["time"], axis=0)
+    columns = np.column_stack([run["time"], run["position"], speed, run["effort"]])
+    np.savetxt(tmp_path / "run.csv", columns, delimiter=",")
+    found = begun(tmp_path / "run.csv", robot)
+    assert "output: {column: [1, 2]}" in found.signals and "effort: {column: [5, 6]" in found.signals
+    assert "# CHECK output: no name says" in found.signals and "# CHECK effort: no name says" in found.signals
+    (tmp_path / "signals.yaml").write_text(found.signals)
+    (record,) = load_joint_records([tmp_path / "run.csv"], tmp_path / "signals.yaml")
+    np.testing.assert_allclose(record.joints["elbow_joint"].output.value, run["position"][:, 1], atol=1e-12)
+    np.savetxt(tmp_path / "run.csv", np.delete(columns, [3, 4], axis=1), delimiter=",")
+    with pytest.raises(
+        InputError,
+        match="no measured position of a joint of arm.urdf is found: its columns have no names; .* first line of names",
+    ):
+        begun(tmp_path / "run.csv", robot)
+
+
+@pytest.mark.parametrize("name", ["rail_pos", "rail_height"])
+def test_a_recorded_joint_that_nothing_drives_and_that_moves_all_others_is_the_base(
+    tmp_path, robot, run, name
+):
+    slide = JOINT.format(name="rail", kind="prismatic", above="base", below="carriage", down=0)
+    robot.write_text(
+        ARM.replace('<parent link="base"/>', '<parent link="carriage"/>').replace(
+            "</robot>", f'<link name="carriage">{LINK.format(mass=1.0)}</link>{slide}</robot>'
+        )
+    )
+    moving = {**run, "rail": 0.1 * run["position"][:, :1]}
+    heads = ["shoulder_pos", "elbow_pos", "shoulder_tau", "elbow_tau", name]
+    found = begun(table(tmp_path / "run.csv", moving, heads, "position", "effort", "rail"), robot)
+    assert f'base: {{column: "{name}"}}' in found.signals and "  base: rail" in found.model
+    assert "hold: [finger_joint]" in found.model
+    (tmp_path / "signals.yaml").write_text(found.signals)
+    (record,) = load_joint_records([tmp_path / "run.csv"], tmp_path / "signals.yaml")
+    assert record.base is not None
+    heads = ["shoulder_pos", "elbow_pos", "rail_tau", "elbow_tau", name.replace("height", "pos")]
+    moving["rail"] = np.column_stack([run["position"][:, 0]])
+    with pytest.raises(
+        InputError,
+        match="neither efforts nor references of shoulder were recorded, only positions; .* column of zeros",
+    ):
+        begun(
+            table(
+                tmp_path / "run.csv",
+                moving,
+                [*heads[:3], "elbow_tau", "rail_pos"],
+                "position",
+                "effort",
+                "rail",
+            ),
+            robot,
+        )
+
+
 def test_references_alone_get_controllers_whose_gains_are_to_be_checked(tmp_path, robot, run):
     names = ["shoulder_joint", "elbow_joint"]
     times = NOW + run["time"]

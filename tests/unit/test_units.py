@@ -92,3 +92,14 @@ def test_a_machines_own_unit_is_taken_by_both_files(own):
 @pytest.mark.parametrize("unit", ["mm", "deg", "kN", "rpm"])
 def test_a_multiple_of_an_si_unit_is_named_with_its_scale(unit):
     assert multiple_of_si(unit) is not None
+
+
+@pytest.mark.parametrize("unit", ["Nbase_yawm", "N*", "rad/", "m s)"])
+def test_a_unit_that_cannot_be_read_is_refused(unit):
+    with pytest.raises(InputError, match="cannot be read as a unit: write it like"):
+        Signals.from_text(f"time: {{column: t}}\noutput: {{file: a.csv, column: x, unit: '{unit}'}}\n")
+
+
+@pytest.mark.parametrize("unit", ["N*m", "N m", "px", "%", "1", "m/s²", "inH2O", "counts/s"])
+def test_a_machines_own_unit_is_read(unit):
+    Signals.from_text(f"time: {{column: t}}\noutput: {{file: a.csv, column: x, unit: '{unit}'}}\n")

@@ -4,7 +4,8 @@ E. Todorov, T. Erez, Y. Tassa, MuJoCo: a physics engine for model-based control,
 """
 
 import copy
-from collections.abc import Iterable, Mapping, Sequence
+import hashlib
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -29,6 +30,7 @@ from rhythmid.body.robot_file import (
 )
 from rhythmid.errors import InputError
 
+MEMORY = 1e8  # bytes of forces of single links that are kept
 HEAVIEST = 1e6  # [kg] a larger mass of a link is a mistake
 AS_THE_LINK = np.array([1.0, 0.0, 0.0, 0.0])  # axes aligned with the link's frame
 WEIGHTLESS = 1e-10  # [kg] if all links together weigh less, they have no mass other than `LEAST_MASS`
@@ -56,6 +58,7 @@ class MujocoBody(Body):
         default_factory=dict
     )  # for links whose inertia is not the file's, the ten numbers (10,) without a payload
     mounted: bool = False  # whether gravity differs from the file's
+    _alone: dict[Hashable, Array] = field(default_factory=dict, repr=False)  # forces of single links
 
     @classmethod
     def load(
@@ -128,7 +131,7 @@ class MujocoBody(Body):
         """A copy with another acceleration of gravity (3,) [m/s^2] in the frame of the file's world, as of a base that hangs or is on a wall."""
         model = copy.copy(self.model)
         model.opt.gravity[:] = gravity
-        return replace(self, model=model, mounted=True)
+        return replace(self, model=model, mounted=True, _alone={})
 
     def worker(self) -> tuple[Any, Any]:
         """A model and the data of a run, for use in one thread."""
@@ -159,6 +162,18 @@ class MujocoBody(Body):
                 return str(self.model.joint(first + count - 1).name)
             number = int(self.model.body_parentid[number])
         raise InputError(f"{self.path}: the link {link!r} does not move")
+
+    def carries_all(self, joint: str) -> bool:
+        """Whether a joint moves all other joints, as that of a base does."""
+        own = int(self.model.jnt_bodyid[self.model.joint(joint).id])
+        first = int(self.model.body_jntadr[own])
+        if self.model.joint(first).name != joint:
+            return False
+        within = {own}
+        for body in range(own + 1, self.model.nbody):  # a body comes after the one that carries it
+            if int(self.model.body_parentid[body]) in within:
+                within.add(body)
+        return all(int(one) in within for one in self.model.jnt_bodyid)
 
     @cached_property
     def hinges(self) -> dict[str, Hinge]:
@@ -304,13 +319,27 @@ class MujocoBody(Body):
         return made
 
     def _of_one(self, link: int, inertia: Principal, motion: tuple[Array, Array, Array]) -> Array:
-        """Forces (n, nv) for one link with this inertia and the others without any."""
+        """Forces (n, nv) for one link with this inertia and the others without any, read-only.
+
+        They do not depend on the inertia that the link has in this body, so that bodies with other inertias share what is known.
+        """
+        of = hashlib.blake2b(digest_size=16)
+        for one in (inertia.moments, inertia.centre, inertia.turn, *motion):
+            of.update(np.ascontiguousarray(one, dtype=float))
+        key = (link, inertia.mass, len(motion[0]), of.digest())
+        if (known := self._alone.get(key)) is not None:
+            return known
         model, data = self.worker()
         for one in (model.body_mass, model.body_inertia, model.jnt_stiffness, model.dof_damping):
             one[:] = 0.0
         model.dof_armature[:] = 1.0  # MuJoCo always factorises the inertia matrix
         inertia.put_into(model, link)
-        return self._along(model, data, *motion) - motion[2]
+        made = self._along(model, data, *motion) - motion[2]
+        made.flags.writeable = False  # it is returned again
+        if (len(self._alone) + 1) * made.nbytes > MEMORY:
+            self._alone.clear()
+        self._alone[key] = made
+        return made
 
     def inertial_columns(self, link: str, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Columns (n, nv, 10) of a link's mass, mass times position of the centre (3), and inertia about the link's

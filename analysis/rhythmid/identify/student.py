@@ -21,14 +21,18 @@ MEDIAN = 0.741  # median of |t| for 4 degrees of freedom and unit scale
 def scale_of(error: Array) -> float:
     """Maximum-likelihood scale of errors (n,); `NO_ERROR` where all are zero."""
     square = error**2
-    rms = float(np.sqrt(np.mean(square)))
+    count = len(error)
+    rms = math.sqrt(float(np.add.reduce(square)) / count)
     if rms < NO_ERROR:
         return NO_ERROR
-    scale = float(np.median(np.abs(error)) / MEDIAN)
+    middle = (count - 1) // 2, count // 2
+    ranked = np.partition(np.abs(error), middle)
+    scale = 0.5 * float(ranked[middle[0]] + ranked[middle[1]]) / MEDIAN
     if scale < HARDLY * rms:  # most errors are zero: use the scale of the others
         scale = rms
     for _ in range(SETTLES):
-        new = math.sqrt(float(np.mean((DEGREES + 1.0) * square / (DEGREES + square / scale**2))))
+        terms = (DEGREES + 1.0) * square / (DEGREES + square / scale**2)
+        new = math.sqrt(float(np.add.reduce(terms)) / count)
         new = max(new, NO_ERROR)
         if abs(new - scale) < 1e-3 * scale:
             return new

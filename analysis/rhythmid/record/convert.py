@@ -1,7 +1,6 @@
 """Writes a record as a bag: its channels as joint states, with a signals.yaml that reads them back."""
 
 import math
-import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from rhythmid.record.bag_writer import Storage, write_bag
 from rhythmid.record.messages import Messages
 from rhythmid.record.record import Channel, Record
 
+ROOT = "/"  # namespace of the topics: the same in every bag, so that one signals.yaml reads several
 STATES = "joint_states"
 TOPICS = {
     "input": "joint_commands",
@@ -31,7 +31,6 @@ def write_record(record: Record, path: str | Path, joint: str = "joint", storage
     where the record's times are negative or start late. Raises InputError where the bag exists or cannot be
     written, or where the record has an acceleration, which no joint state can hold.
     """
-    namespace = namespace_of(record.name)
     channels = {
         role: one for role, one in record.channels.items() if role != "forcing" or record.forcing_law is None
     }
@@ -44,16 +43,10 @@ def write_record(record: Record, path: str | Path, joint: str = "joint", storage
         stamps = _stamps(channels[roles[0]], shift)
         values = {fields[role]: channels[role].value for role in roles}
         topics[name] = Messages(stamps, values.get("position"), values.get("velocity"), values.get("effort"))
-    text = _signals(record, placed, namespace, joint, shift)
-    made = write_bag(path, topics, storage, joint=joint, namespace=namespace)
+    text = _signals(record, placed, joint, shift)
+    made = write_bag(path, topics, storage, joint=joint, namespace=ROOT)
     write_text(made / "signals.yaml", text)
     return made
-
-
-def namespace_of(name: str) -> str:
-    """The namespace of the topics of a record with this name."""
-    plain = re.sub(r"\W+", "_", name).strip("_") or "record"
-    return f"/_{plain}" if plain[0].isdigit() else f"/{plain}"
 
 
 def field_of(role: str, record: Record) -> str:
@@ -94,9 +87,7 @@ def _stamps(channel: Channel, shift: float) -> NDArray[np.int64]:
     return np.rint((channel.time - shift) * 1e9).astype(np.int64)
 
 
-def _signals(
-    record: Record, placed: Mapping[str, tuple[str, str]], namespace: str, joint: str, shift: float
-) -> str:
+def _signals(record: Record, placed: Mapping[str, tuple[str, str]], joint: str, shift: float) -> str:
     lines = ["time: header"]
     if "input" not in placed:
         lines.append("input: none")
@@ -107,9 +98,7 @@ def _signals(
             more = f", kind: {record.input_kind}, hold: {record.hold}"
         elif role == "output":
             more = f", kind: {record.output_kind}"
-        lines.append(
-            f'{role}: {{topic: {namespace}/{topic}, field: "{field}[{joint}]", unit: "{channel.unit}"{more}}}'
-        )
+        lines.append(f'{role}: {{topic: /{topic}, field: "{field}[{joint}]", unit: "{channel.unit}"{more}}}')
     law = record.forcing_law
     if law is not None:
         phase = law.phase + 2.0 * math.pi * law.frequency * shift

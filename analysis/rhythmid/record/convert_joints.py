@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.output import write_text
 from rhythmid.record.bag_writer import Storage
-from rhythmid.record.convert import STATES, TOPICS, field_of, namespace_of, shift_of
+from rhythmid.record.convert import STATES, TOPICS, field_of, shift_of
 from rhythmid.record.joint_messages import Columns, write_joint_bag
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Channel, Record
@@ -35,7 +35,6 @@ def write_joint_record(record: JointRecord, path: str | Path, storage: Storage =
                 f"{record.name}: {joint}: a forcing by formula is no joint state; keep the table"
             )
     shift = min(shift_of(one) for one in every.values())
-    namespace = namespace_of(record.name)
     roles = [
         role
         for role in ("output", "velocity", "effort", "input", "forcing", "reference")
@@ -44,9 +43,9 @@ def write_joint_record(record: JointRecord, path: str | Path, storage: Storage =
     topics: dict[str, Stream] = {}
     for topic in dict.fromkeys(_topic(role) for role in roles):
         own = [role for role in roles if _topic(role) == topic]
-        topics[f"{namespace}/{topic}"] = _stream(every, own, shift)
+        topics[f"/{topic}"] = _stream(every, own, shift)
     made = write_joint_bag(path, topics, storage)
-    write_text(made / "signals.yaml", _signals(record, roles, namespace))
+    write_text(made / "signals.yaml", _signals(record, roles))
     return made
 
 
@@ -80,7 +79,7 @@ def _stamps(channel: Channel, shift: float) -> NDArray[np.int64]:
     return np.rint((channel.time - shift) * 1e9).astype(np.int64)
 
 
-def _signals(record: JointRecord, roles: list[str], namespace: str) -> str:
+def _signals(record: JointRecord, roles: list[str]) -> str:
     """The text of the signals.yaml."""
     lines = ["time: header", f"joints: [{', '.join(map(json.dumps, record.joints))}]"]
     for role in roles:
@@ -93,12 +92,12 @@ def _signals(record: JointRecord, roles: list[str], namespace: str) -> str:
         elif role == "effort":
             more = f", taken: {record.taken}" + (f", sampled: {record.sampled}" if record.sampled else "")
         lines.append(
-            f'{role}: {{topic: {namespace}/{_topic(role)}, field: "{field_of(role, one)}[*]", unit: "{one.channels[role].unit}"{more}}}'
+            f'{role}: {{topic: /{_topic(role)}, field: "{field_of(role, one)}[*]", unit: "{one.channels[role].unit}"{more}}}'
         )
     if record.base is not None:
         field = field_of("output", record.base)
         lines.append(
-            f'base: {{topic: {namespace}/{STATES}, field: "{field}[{BASE}]", unit: "{record.base.output.unit}", '
+            f'base: {{topic: /{STATES}, field: "{field}[{BASE}]", unit: "{record.base.output.unit}", '
             f"kind: {record.base.output_kind}}}"
         )
     given = {name: value for one in record.joints.values() for name, value in one.parameters.items()}

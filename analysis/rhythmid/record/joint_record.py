@@ -10,12 +10,13 @@ A signals.yaml with `joints:` maps the channels of all joints at once:
 
 A channel's `scale` holds for all joints, or is given by joint: `scale: {knee: -1}`; joints that are not named have
 scale 1. `[*]` stands for each joint's name in a bag and for its index in a table's array (`column: "q[*]"`).
-Elsewhere in a column's name `*` stands for the joint's name (`column: "q_*"`). A channel without topic or file
+Elsewhere in a column's name `*` stands for the joint's name (`column: "q_*"`); a list has the column of each joint
+(`column: [1, 2]`). A channel without topic or file
 takes the output's. A command that is a position is a reference for the controllers, see `kind` in the signals.yaml
 of one axis; `feedforward` is a force that the controllers add.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -168,6 +169,7 @@ def _joint_signals(document: Node, path: Path) -> JointSignals:
             keys[role] = _with_shared(node, output)
     for role in ("input", "forcing", "output", "effort"):
         _check_scale(keys.get(role), names)
+        _check_columns(keys.get(role), names)
     whole = replace(document, value=keys)
     found = {
         joint: Signals.from_node(_for_joint(whole, joint, own, place), path)
@@ -212,18 +214,29 @@ def _check_scale(channel: Node | None, names: Iterable[str]) -> None:
                 one.fail(f"is no joint; those are {', '.join(names)}")
 
 
+def _check_columns(channel: Node | None, names: Collection[str]) -> None:
+    """Raise InputError where a channel lists more or fewer columns than there are joints."""
+    column = channel.value.get("column") if channel is not None and isinstance(channel.value, dict) else None
+    if column is not None and isinstance(column.value, list) and len(column.value) != len(names):
+        column.fail(
+            f"lists {len(column.value)} columns of {len(names)} joints; give each joint one, in the order of 'joints:'"
+        )
+
+
 def _for_joint(node: Node, joint: str, own: str, place: int) -> Node:
-    """The document with `own`, the joint's name in the recording, inserted for every star, and with the values that are given for `joint`
-    by its name in the model."""
+    """The document with `own`, the joint's name in the recording, inserted for every star but those of units, and with the values that are
+    given for `joint` by its name in the model."""
     if isinstance(node.value, dict) and node.path.endswith("scale"):
         said = node.value.get(joint)
         return replace(node, value=1.0) if said is None else said
     if isinstance(node.value, dict):
         made = {key: _for_joint(one, joint, own, place) for key, one in node.value.items()}
         return replace(node, value=made)
+    if isinstance(node.value, list) and node.path.endswith("column"):
+        return node.value[place]
     if isinstance(node.value, list):
         return replace(node, value=[_for_joint(one, joint, own, place) for one in node.value])
-    if not isinstance(node.value, str) or "*" not in node.value:
+    if not isinstance(node.value, str) or "*" not in node.value or node.path.endswith("unit"):
         return node
     column = node.path.endswith("column")
     text = node.value.replace("[*]", f"[{place}]" if column else f"[{own}]")

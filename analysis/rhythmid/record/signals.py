@@ -36,7 +36,7 @@ from rhythmid.document import Node, parse, read
 from rhythmid.errors import InputError
 from rhythmid.record.field import Field
 from rhythmid.simulation.signal import Hold
-from rhythmid.units import multiple_of_si
+from rhythmid.units import is_readable, multiple_of_si
 from rhythmid.validation import ByShape, InKeys, Number, Plain, Range, Word, validated
 
 InputKind = Literal["force", "base_displacement", "base_acceleration", "reference"]
@@ -214,6 +214,8 @@ def _of_si(unit: str) -> str:
     if (known := multiple_of_si(unit)) is not None:
         factor, si = known
         raise ValueError(f"{unit} is not an SI unit: write  scale: {factor:.10g}, unit: {si}")
+    if not is_readable(unit):
+        raise ValueError(f"{unit!r} cannot be read as a unit: write it like  rad, N*m, m/s^2, V  or  px")
     return unit
 
 

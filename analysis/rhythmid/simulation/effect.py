@@ -200,7 +200,7 @@ def effect_along(
         known.append(load_along(model, path))
     elif element.acts == "constraint":
         known.append(path.slope)
-    rows = np.ascontiguousarray(np.vstack(known), dtype=float)
+    rows = np.array(known, dtype=float)
     out = np.empty(len(path.time))
     _run_of(element)(
         np.ascontiguousarray(path.time), rows, np.array([*parameters, *borrowed.values()], dtype=float), states,

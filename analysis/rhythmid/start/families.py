@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rhythmid.record.inventory import Inventory, Recorded
-from rhythmid.start.meaning import Quantity, meaning_of, words_of
+from rhythmid.start.meaning import Meaning, Quantity, meaning_of, words_of
 
 GENERIC = frozenset({"joint"})  # words that a robot's file and its recordings add to joint names arbitrarily
 
@@ -29,12 +29,14 @@ class Family:
     pattern : the field or the name of the column with a star instead of the joint.
     members : by the joint's name in the recording, or its number.
     told : whether joints are identified by names rather than by numbers, whose order is a guess.
+    meaning : what its numbers are, where that is not said by their names.
     """
 
     topic: str
     pattern: str
     members: Mapping[str, Recorded]
     told: bool
+    meaning: Meaning | None = None
 
     @property
     def first(self) -> Recorded:
@@ -42,22 +44,32 @@ class Family:
         return next(iter(self.members.values()))
 
     @property
+    def said(self) -> Meaning:
+        """What its members are: by their names without that of the joint, of which a part may be a word (axis_a has the letter of an acceleration)."""
+        if self.meaning is not None:
+            return self.meaning
+        joint, first = next(iter(self.members.items()))
+        rest = first.said.replace(joint, " ", 1)
+        return meaning_of(replace(first, said=rest) if self.told and words_of(rest) else first)
+
+    @property
     def quantity(self) -> Quantity | None:
         """Quantity of its members; None where nothing states it."""
-        return meaning_of(self.first).quantity
+        return self.said.quantity
 
     @property
     def commanded(self) -> bool:
         """Whether its members are commanded rather than measured."""
-        return meaning_of(self.first).commanded is True
+        return self.said.commanded is True
 
     def channel(self, bag: bool) -> str:
         """The channel in the notation of signals.yaml, without braces."""
-        named = (
-            f"topic: {self.topic}, field: {json.dumps(self.pattern)}"
-            if bag
-            else f"column: {json.dumps(self.pattern)}"
-        )
+        if "*" not in self.pattern:
+            named = f"column: [{', '.join(one.column for one in self.members.values())}]"
+        elif bag:
+            named = f"topic: {self.topic}, field: {json.dumps(self.pattern)}"
+        else:
+            named = f"column: {json.dumps(self.pattern)}"
         unit = f", unit: {json.dumps(self.first.unit)}" if self.first.unit else ""
         scale = "" if self.first.scale == 1.0 else f", scale: {self.first.scale:.10g}"
         return named + unit + scale

@@ -8,13 +8,13 @@ commanded positions the references.
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rhythmid.body.machine import KINDS, Machine
+from rhythmid.body.machine import FIXED, KINDS, TRANSITION, Machine
 from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
@@ -22,13 +22,17 @@ from rhythmid.record.inventory import Inventory, header_clock, inventory
 from rhythmid.record.joint_record import JointSignals, load_joint_records
 from rhythmid.start.drivers import not_read
 from rhythmid.start.families import GENERIC, Family, families_of, joints_of, with_constants
-from rhythmid.start.meaning import Quantity, meaning_of, says_it_was_read, words_of
+from rhythmid.start.first_gains import first_gains
+from rhythmid.start.leading_family import leading_family
+from rhythmid.start.meaning import ELECTRICAL, WORDS, Quantity, says_it_was_read, words_of
+from rhythmid.start.passive_joints import base_channel, base_of, unused, without_passive
+from rhythmid.start.unnamed_families import HOW, unnamed_families, without_names
 from rhythmid.start.unsigned_effort import unsigned_family
 from rhythmid.start.yaml_text import GUESSED, as_guessed, comment, time_of
 
-CURRENTS = frozenset(
-    {"i", "iq", "current", "currents", "amp", "amps", "ampere", "amperes"}
-)  # words that name a current, not a force
+# words that name a current, and those that name a force, also one that was computed from a current
+CURRENTS = frozenset(ELECTRICAL["A"].split()) | {"ampere", "amperes"}
+OF_FORCE = WORDS["effort"] - frozenset(" ".join(ELECTRICAL.values()).split())
 LITTLE = 0.02  # share of the effort assigned to viscous damping as a first guess
 # first guess for a controller with unknown gains: this frequency [Hz] and damping ratio with the inertia of the joint
 STIFF, DAMPED = 3.0, 0.7
@@ -69,17 +73,25 @@ def start_robot(
     """
     robot = MujocoBody.load(body, contacts=False)
     found = inventory(sources[0], rate)
-    families = list(families_of(found, list(robot.joints)))
+    nameless = without_names(found)
+    families = unnamed_families(found) if nameless else list(families_of(found, list(robot.joints)))
     output = _chosen(families, "position", False, robot)
+    if output is None and nameless:
+        raise InputError(f"{found.path}: no measured position of a joint of {body.name} is found: {HOW}")
     if output is None:
         raise InputError(
             f"{found.path}: no measured position of a joint of {body.name} is among {', '.join(map(str, found.recorded))}; "
             f"its joints: {', '.join(robot.joints)}"
         )
-    joints = joints_of(list(robot.joints), list(output.members), output.told)
     families = [one if one is output else with_constants(one, found, output.members) for one in families]
-    effort, others, unsigned = _effort(families, output)
-    reference = _beside(families, "position", True, output)
+    whole, (output, idle) = output, without_passive(families, output)
+    families = [output if one is whole else one for one in families]
+    base = base_of(str(found.path), robot, families, replace(output, members=whole.members), idle)
+    joints = joints_of(list(robot.joints), list(output.members), output.told)
+    reference, of_reference = _beside(families, "position", True, output), list[str]()
+    if reference is None:
+        output, reference, of_reference = leading_family(families, output)
+    effort, others, unsigned = _effort(families, output, reference)
     command = _beside(families, "effort", True, output)
     forward = command if reference is not None else None
     if effort is None and reference is None:
@@ -96,7 +108,8 @@ def start_robot(
         if one
     ]
     of_effort = [*unsigned, *_doubts_of_effort(effort, others, command)]
-    signals, doubts = _signals(found, joints, output, effort, reference, forward, of_effort)
+    signals, doubts = _signals(found, joints, output, effort, reference, forward, of_effort, of_reference)
+    signals += f"\n{base_channel(base[1])}\n" if base is not None else ""
     with as_guessed():
         records = load_joint_records(sources, JointSignals.from_text(signals, GUESSED))
     speeds = {
@@ -107,11 +120,21 @@ def start_robot(
         name: float(np.std(one.effort.value)) if one.effort else 0.0
         for name, one in records[0].joints.items()
     }
-    known = robot, body, joints, speeds, sizes, reference is not None
+    gains = {name: first_gains(one) for name, one in records[0].joints.items()}
+    moved = base[0] if base is not None else None
+    known = robot, body, joints, speeds, sizes, gains if reference is not None else None, moved
     Machine.from_text(_model(str(body.resolve()), *known), Path(), catalogue)  # `out` need not exist yet
     model = _model(os.path.relpath(body.resolve(), out.resolve()), *known)
-    idle = [name for name in robot.joints if name not in joints]
-    doubts += [f"held at zero, because not recorded: {', '.join(idle)}"] if idle else []
+    held = [name for name in robot.joints if name not in joints and name != moved]
+    doubts += [f"held at zero, because not recorded: {', '.join(held)}"] if held else []
+    doubts += [
+        f"{joint} is held at zero, but {names} may be its position; it is not used"
+        for joint, names in unused(families, held).items()
+    ]
+    if moved is not None:
+        doubts.append(
+            f"base: nothing that was recorded drives {moved}, which moves all others; it is taken for the base's joint"
+        )
     doubts += list(robot.notes)
     return RobotStart(signals, model, tuple(told), tuple(doubts))
 
@@ -147,15 +170,17 @@ def _all_beside(
     )  # fmt: skip
 
 
-def _effort(families: Sequence[Family], output: Family) -> tuple[Family | None, list[Family], list[str]]:
+def _effort(
+    families: Sequence[Family], output: Family, reference: Family | None
+) -> tuple[Family | None, list[Family], list[str]]:
     """The effort that was not commanded, preferably a force and a sensor reading, not a current; the other efforts; and
     a note on each effort without its sign. A force that never acts at any joint gives way to a current."""
     able = sorted(
         _all_beside(families, "effort", False, output),
         key=lambda one: (_idle(one), _is_current(one), not says_it_was_read(one.first)),
     )
-    references = list(_all_beside(families, "position", True, output))
-    notes = {one.pattern: unsigned_family(one, output, references[:1]) for one in able}
+    references = [reference] if reference is not None else []
+    notes = {one.pattern: unsigned_family(one, output, references) for one in able}
     able = [one for one in able if not notes[one.pattern]]
     return (able[0] if able else None), able[1:], [note for note in notes.values() if note]
 
@@ -167,7 +192,8 @@ def _idle(family: Family) -> bool:
 
 def _is_current(family: Family) -> bool:
     """Whether a family is called a current, or is in amperes."""
-    return family.first.unit == "A" or bool(CURRENTS & set(words_of(family.pattern.lower())))
+    words = set(words_of(family.pattern))
+    return family.first.unit == "A" or bool(CURRENTS & words and not OF_FORCE & words)
 
 
 def _other_numbers(families: Sequence[Family], output: Family) -> str:
@@ -201,7 +227,12 @@ def _doubts_of_effort(effort: Family | None, others: Sequence[Family], command: 
             f"effort: that of {', '.join(still)} is always 0, as where no motor acts; where one acts whose effort was not "
             "recorded, nothing that is said of these joints holds"
         )
-    if not effort.first.unit and _is_current(effort):
+    if effort.meaning is not None:
+        doubts.append(
+            f"effort: no name says that {effort.pattern} are efforts, nor their unit; where they are in A, give them the torque or force of one "
+            "ampere at each joint, such as  scale: {JOINT: 10}"
+        )
+    elif not effort.first.unit and _is_current(effort):
         doubts.append(
             f"effort: {effort.pattern} is called a current; where it is in A, give it the torque or force of one ampere at each joint, such as  "
             "scale: {JOINT: 10}"
@@ -220,7 +251,7 @@ def _doubts_of_effort(effort: Family | None, others: Sequence[Family], command: 
 
 def _line(role: str, one: Family, bag: bool, joints: Mapping[str, str]) -> str:
     where = f"{one.topic} {one.pattern}" if bag else one.pattern
-    return f"{role}: {where} of {len(joints)} joints: {meaning_of(one.first).reason or 'the only one left'}"
+    return f"{role}: {where} of {len(joints)} joints: {one.said.reason or 'the only one left'}"
 
 
 def _signals(
@@ -231,6 +262,7 @@ def _signals(
     reference: Family | None,
     forward: Family | None,
     of_effort: Sequence[str],
+    of_reference: Sequence[str],
 ) -> tuple[str, list[str]]:
     """The text of signals.yaml, and doubts about it."""
     bag, doubts = found.is_bag, list[str]()
@@ -240,6 +272,10 @@ def _signals(
     if output.told and any(frozenset(words_of(one)) - GENERIC not in alike for one in joints.values()):
         doubts.append(
             "joints: the recording has other names than the robot's file; they are matched by what differs among them"
+        )
+    if output.meaning is not None:
+        doubts.append(
+            f"output: no name says that {output.pattern} are positions; they are taken for them, because the columns after them are their slopes"
         )
     if not output.told:
         doubts.append(
@@ -258,11 +294,15 @@ def _signals(
             if forward is not None and forward.topic == reference.topic
             else ""
         )
+        doubts += of_reference
         lines += [
-            "",
+            "", *(line for doubt in of_reference for line in comment(f"CHECK {doubt}.")),
             *comment("what the robot's controllers are asked for."),
             f"input: {{{reference.channel(bag)}, kind: reference{extra}}}",
-        ]
+        ]  # fmt: skip
+    elif of_reference:
+        doubts += of_reference
+        lines += ["", *(line for doubt in of_reference for line in comment(f"CHECK {doubt}."))]
     if effort is None:
         doubts += of_effort
         lines += [line for doubt in of_effort for line in comment(f"CHECK {doubt}.")]
@@ -281,9 +321,8 @@ def _signals(
 
 def _names(joints: Mapping[str, str], output: Family) -> str:
     """The robot's joints, with their names in the recording where these differ."""
-    by_place = (
-        output.pattern.endswith("[*]") and not output.told
-    )  # entries of an array are identified by their index in the list
+    # entries of an array and columns without names are identified by their place in the list
+    by_place = not output.told and (output.pattern.endswith("[*]") or output.meaning is not None)
     if by_place or all(joint == name for joint, name in joints.items()):
         return f"[{', '.join(joints)}]"
     return f"{{{', '.join(f'{joint}: {json.dumps(name)}' for joint, name in joints.items())}}}"
@@ -296,35 +335,56 @@ def _model(
     joints: Mapping[str, str],
     speeds: Mapping[str, float],
     efforts: Mapping[str, float],
-    controlled: bool,
+    gains: Mapping[str, tuple[float, float, float] | None] | None,
+    base: str | None,
 ) -> str:
-    """The text of model.yaml."""
+    """The text of model.yaml; `gains` are those of the controllers that the record determines, None without references."""
     kind = KINDS[1] if path.suffix.lower() == ".urdf" else KINDS[0]
-    hold = [name for name in robot.joints if name not in joints]
+    hold = [name for name in robot.joints if name not in joints and name != base]
     free = ", ".join(f"{joint}.armature: {{}}" for joint in joints)
     lines = [
         *comment("A nominal model to begin with, made by `rhythmid init` of the robot's file: all values below are first guesses and are estimated."),
         "", *comment("free: the inertia of each rotor, which such files seldom have."),
-        "body:", f"  {kind}: {json.dumps(place)}", "  base: fixed", "  contacts: false",
+        "body:", f"  {kind}: {json.dumps(place)}", f"  base: {base or FIXED}",
+        *(comment("  CHECK contacts: true where the robot touches the ground.") if base else ()), "  contacts: false",
     ]  # fmt: skip
     if hold:
         lines.append(f"  hold: [{', '.join(hold)}]")
     lines += [f"  free: {{{free}}}", "joints:"]
-    if controlled:
-        lines += comment(
-            "  CHECK position_control: the gains of the robot's controllers are not told by what was recorded. Without an effort, forces have their scale from them."
-        )
+    if gains is not None:
+        lines += _said_of_gains(gains)
     for joint in joints:
         lines.append(f"  {joint}:")
         inertia = robot.effective_inertia(joint)
-        if controlled:
-            stiffness = inertia * (2.0 * np.pi * STIFF) ** 2
-            damping = 2.0 * DAMPED * np.sqrt(inertia * stiffness)
+        if gains is not None:
+            known = gains[joint]
+            stiffness = known[0] if known else inertia * (2.0 * np.pi * STIFF) ** 2
+            damping = known[1] if known else 2.0 * DAMPED * np.sqrt(inertia * stiffness)
             lines.append(
                 f"    command: [{{position_control: {{proportional: {stiffness:.3g}, derivative: {damping:.3g}}}}}]"
             )
         guess = robot.passive[joint].damping or LITTLE * (efforts[joint] or inertia) / max(
             speeds[joint], 1e-9
         )
-        lines.append(f"    force: [{{viscous_damper: {{damping: {guess:.3g}}}}}]")
+        dry = robot.passive[joint].friction
+        rubs = (
+            f", {{coulomb_friction: {{force: {dry:.3g}, transition: {TRANSITION:g}}}}}" if dry > 0.0 else ""
+        )
+        lines.append(f"    force: [{{viscous_damper: {{damping: {guess:.3g}}}}}{rubs}]")
     return "\n".join(lines) + "\n"
+
+
+def _said_of_gains(gains: Mapping[str, tuple[float, float, float] | None]) -> list[str]:
+    """What is known of the controllers' gains, as comments."""
+    told = {joint: f"{one[2]:.0%} at {joint}" for joint, one in gains.items() if one is not None}
+    lines: list[str] = []
+    if told:
+        lines += comment(
+            f"  CHECK position_control: gains by least squares of reference, position and effort, of which they explain {', '.join(told.values())}; put in those that are known."
+        )
+    if len(told) < len(gains):
+        of = f" at {', '.join(joint for joint in gains if joint not in told)}" if told else ""
+        lines += comment(
+            f"  CHECK position_control: the gains of the robot's controllers are not told by what was recorded{of}. Without an effort, forces have their scale from them."
+        )
+    return lines

@@ -9,6 +9,7 @@ import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,7 @@ class Balance:
     stick_speed : speed below which samples are left out.
     stuck : share of the rows that were left out for this reason.
     period : sample period [s] of motion or recorded effort, whichever is longer: the unit of the alignment.
+    fits : the latest fits to these rows, by all that they depend on.
     """
 
     motions: tuple[Motion, ...]
@@ -72,6 +74,8 @@ class Balance:
     period: float
     _forces: dict[Hashable, Array] = field(default_factory=dict, repr=False)
     _sensitive: dict[str, bool] = field(default_factory=dict, repr=False)
+    # of this balance alone: a copy with other values has none
+    fits: dict[Hashable, Any] = field(init=False, default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, records: Sequence[Record], model: Model, bandwidth: Bandwidth | None = None) -> "Balance":
@@ -121,9 +125,17 @@ class Balance:
 
     def rows(self, signals: Iterable[Array], shift: float = 0.0) -> Array:
         """Filtered signals at the rows, `shift` [s] later. One (n,) or (n, p) per motion gives (rows,) or (rows, p)."""
+        return self.at_rows(self.all_filtered(signals), shift)
+
+    def all_filtered(self, signals: Iterable[Array]) -> list[Array]:
+        """One signal (n,) or (n, p) per motion, filtered."""
+        return [self.filtered(one, motion.period) for one, motion in zip(signals, self.motions, strict=True)]
+
+    def at_rows(self, signals: Sequence[Array], shift: float = 0.0) -> Array:
+        """Signals that are filtered already, at the rows, `shift` [s] later."""
         return np.concatenate(
             [
-                sampled(self.filtered(one, motion.period), places, shift / motion.period)
+                sampled(one, places, shift / motion.period)
                 for one, motion, places in zip(signals, self.motions, self.places, strict=True)
             ]
         )

@@ -20,6 +20,9 @@ from rhythmid.model import INERTIA, Model
 from rhythmid.value import Prior
 
 Array = NDArray[np.float64]
+REMEMBERED = (
+    64  # latest fits that a balance keeps: those of the hypotheses of a joint (fewer than 50 were seen)
+)
 # relative standard deviation of a value without a stated prior: a factor of two either way (ln 2)
 SPREAD = 0.7
 # least change of the effort, as a share of its size, that one standard deviation of a prior allows: a placeholder
@@ -152,10 +155,11 @@ def linearise(balance: Balance, model: Model, names: Sequence[str], alignment: f
     signals = [
         np.column_stack([old, *(column[index] for column in moved)]) for index, old in enumerate(required)
     ]
-    rows = balance.rows(signals, balance.later(model, alignment))
+    signals = balance.all_filtered(signals)
+    rows = balance.at_rows(signals, balance.later(model, alignment))
     first, late = [signal[:, 0] for signal in signals], 0.25 * balance.period
     after, before = (
-        balance.with_moved(balance.rows(first, balance.later(model, at)), model, at)
+        balance.with_moved(balance.at_rows(first, balance.later(model, at)), model, at)
         for at in (alignment + late, alignment - late)
     )
     residual = balance.with_moved(rows[:, 0], model, alignment) - balance.measured
@@ -174,13 +178,30 @@ def fit_effort(
     """Fit the named free parameters of a model (by default all that the effort depends on) to the recorded efforts.
 
     `priors` add to `priors_of`. The fit starts from the model's values and from `alignment` [s]. If a deadline
-    passes, it returns the values reached so far.
+    passes, it returns the values reached so far. A fit of which all is as in one of the latest fits is that fit.
     """
     names = tuple(balance.estimated(model) if names is None else names)
     aligned = aligned or Alignment.of(balance)
+    of = tuple((term.label, id(term.element), tuple(term.values.items())) for term in model.terms)
+    key = (model.mass, of, names, tuple((priors or {}).items()), aligned, alignment, steps)
+    if (known := balance.fits.get(key)) is not None:
+        return known[0]
+    made = _fitted(balance, model, names, priors or {}, aligned, alignment, steps)
+    if not time_is_up():
+        if len(balance.fits) >= REMEMBERED:
+            del balance.fits[next(iter(balance.fits))]
+        balance.fits[key] = made, model  # the model keeps the elements of the key
+    return made
+
+
+def _fitted(
+    balance: Balance, model: Model, names: tuple[str, ...], priors: Mapping[str, Prior], aligned: Alignment,
+    alignment: float, steps: int,
+) -> EffortFit:  # fmt: skip
+    """The fit of `fit_effort`."""
     alignment = min(max(alignment, aligned.low), aligned.high)
     residual, jacobian = linearise(balance, model, names, alignment)
-    known = {**priors_of(balance, model, names, jacobian[:, 1:]), **(priors or {})}
+    known = {**priors_of(balance, model, names, jacobian[:, 1:]), **priors}
     mean: Array = np.array([aligned.mean, *(known[name].mean for name in names)])
     precision: Array = np.array([aligned.std**-2, *(known[name].std ** -2 for name in names)])
     bounds = [(aligned.low, aligned.high), *(model.parameters[name].bounds for name in names)]

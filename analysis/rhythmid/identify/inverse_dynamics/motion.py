@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
@@ -198,18 +198,32 @@ def across(signal: Array, recorded: Mask, bridged: Mask) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _sections(order: int, cut: float, kind: str) -> Array:
-    """Second-order sections of a Butterworth filter; `cut` as a share of the Nyquist frequency."""
-    return np.atleast_2d(np.asarray(butter(order, cut, btype=kind, output="sos")))  # pyright: ignore[reportArgumentType]
+def _sections(order: int, cut: float, kind: str) -> tuple[Array, Array]:
+    """Second-order sections of a Butterworth filter and their states under a constant 1; `cut` as a share of the Nyquist frequency."""
+    sections = np.atleast_2d(np.asarray(butter(order, cut, btype=kind, output="sos")))  # pyright: ignore[reportArgumentType]
+    return sections, np.asarray(sosfilt_zi(sections))
+
+
+def _both_ways(sections: Array, at_rest: Array, values: Array, padding: int) -> Array:
+    """Values (n,) or (n, p) after a filter that is run forwards and backwards, as by scipy's `sosfiltfilt`, which computes the states
+    `at_rest` at every call: for short signals that is most of its time."""
+    begin, end = values[:1], values[-1:]
+    if padding > 0:
+        before, after = 2.0 * begin - values[padding:0:-1], 2.0 * end - values[-2 : -(padding + 2) : -1]
+        values = np.concatenate([before, values, after])
+    states = at_rest.reshape(*at_rest.shape, *(1,) * (values.ndim - 1))
+    forwards = np.asarray(sosfilt(sections, values, axis=0, zi=states * values[:1])[0])
+    back = np.asarray(sosfilt(sections, forwards[::-1], axis=0, zi=states * forwards[-1:])[0])[::-1]
+    return back[padding:-padding] if padding > 0 else back
 
 
 def low_pass(values: Array, period: float, frequency: float) -> Array:
     """Values (n,) or (n, p) after a low-pass Butterworth filter of cut-off `frequency` [Hz], run in both directions."""
     if frequency * period >= 0.45:
         return values
-    sections = _sections(ORDER, 2.0 * frequency * period, "lowpass")
+    sections, at_rest = _sections(ORDER, 2.0 * frequency * period, "lowpass")
     padding = min(len(values) - 1, max(3 * (2 * len(sections) + 1), math.ceil(1.5 / (frequency * period))))
-    return sosfiltfilt(sections, values, axis=0, padlen=padding)
+    return _both_ways(sections, at_rest, values, padding)
 
 
 def high_pass(values: Array, period: float, frequency: float) -> Array:
@@ -217,9 +231,9 @@ def high_pass(values: Array, period: float, frequency: float) -> Array:
     where it is 0."""
     if frequency <= 0.0:
         return values
-    sections = _sections(SLOW_ORDER, 2.0 * frequency * period, "highpass")
+    sections, at_rest = _sections(SLOW_ORDER, 2.0 * frequency * period, "highpass")
     padding = min(len(values) - 1, math.ceil(1.0 / (frequency * period)))
-    return sosfiltfilt(sections, values, axis=0, padlen=padding)
+    return _both_ways(sections, at_rest, values, padding)
 
 
 def motion_of(stretch: Stretch, model: Model, frequency: float, low: float = 0.0) -> Motion:

@@ -95,6 +95,8 @@ class JointBalances:
     leads: Mapping[str, float] = field(default_factory=dict)
     rotor_like: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     refuted: frozenset[tuple[str, str]] = frozenset()
+    # of these balances alone: a copy with other motions has none
+    _made: dict[tuple[str, float], Balance] = field(init=False, default_factory=dict, repr=False)
 
     @classmethod
     def of(
@@ -194,12 +196,16 @@ class JointBalances:
         return next(iter(self.bandwidths.values())).dominant
 
     def balance(self, joint: str, late: float = 0.0) -> Balance:
-        """The balance of one joint whose reference acts `late` [s] after its timestamp. Raises InputError where too
-        few samples are left."""
-        motions = self.motions[joint]
-        if late != 0.0:
-            motions = [_later(motion, self.models[joint], late) for motion in motions]
-        return JointBalance.of_motions(motions, self.bandwidths[joint], self.period, CLEAR)
+        """The balance of one joint whose reference acts `late` [s] after its timestamp; the same at each call, with what is
+        known of it. Raises InputError where too few samples are left."""
+        if (joint, late) not in self._made:
+            motions = self.motions[joint]
+            if late != 0.0:
+                motions = [_later(motion, self.models[joint], late) for motion in motions]
+            self._made[joint, late] = JointBalance.of_motions(
+                motions, self.bandwidths[joint], self.period, CLEAR
+            )
+        return self._made[joint, late]
 
 
 def _later(motion: Motion, model: Model, late: float) -> Motion:
