@@ -1,6 +1,7 @@
 """Workbooks are tables: headings, units, dates and empty cells as in text files, other sheets told, bombs and damage refused."""
 
 import datetime
+import re
 import sys
 import zipfile
 from pathlib import Path
@@ -95,6 +96,19 @@ def test_a_damaged_workbook_is_refused_in_one_line(tmp_path):
         with pytest.raises(InputError, match=r"run\.xlsx: .*(cannot be read|is empty)") as error:
             Table.load(path)
         assert "\n" not in str(error.value)
+
+
+def test_a_workbook_of_labview_whose_fills_are_empty_is_read(tmp_path):
+    path = workbook(tmp_path / "run.xlsx", [HEAD, *ROWS])
+    with zipfile.ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    parts["xl/styles.xml"] = re.sub(
+        rb"<fills.*</fills>", b'<fills count="1"> <fill/></fills>', parts["xl/styles.xml"]
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in parts.items():
+            archive.writestr(name, content)
+    assert list(Table.load(path).columns) == HEAD
 
 
 def test_a_zip_of_something_else_is_refused(tmp_path):

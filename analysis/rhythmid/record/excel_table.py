@@ -1,6 +1,8 @@
 """Workbooks (.xlsx, .xlsm) as text tables: the first sheet with numbers, its cells as a text file would hold them."""
 
 import datetime
+import io
+import re
 import warnings
 import zipfile
 from collections.abc import Iterator
@@ -13,6 +15,9 @@ from rhythmid.record.text_cells import is_number
 from rhythmid.record.text_table import LOOKED_AT, table_of
 
 EXCEL = (".xlsx", ".xlsm")
+STYLES = "xl/styles.xml"
+EMPTY_FILL = re.compile(rb"<fill\s*/>|<fill>\s*</fill>")
+FILL = b"<fill><patternFill/></fill>"
 SEPARATOR = "\t"
 WIDEST_SHEET = 1024  # columns: a cell beyond is a slip, and empty cells up to it would fill the memory
 FEWEST_ROWS = 2  # rows with numbers of a sheet that holds a recording
@@ -35,7 +40,7 @@ def read_excel(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     _check_size(path)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of styles and extensions that hold no numbers
-        book = load_workbook(path, read_only=True, data_only=True)
+        book = load_workbook(_with_fills(path), read_only=True, data_only=True)
         try:
             for place, sheet in enumerate(book.worksheets):
                 lines = _lines(path, sheet)
@@ -61,6 +66,20 @@ def _check_size(path: Path) -> None:
     except zipfile.BadZipFile:
         raise ValueError("it is no workbook, or its end is missing") from None
     _refuse_large(path, size)
+
+
+def _with_fills(path: Path) -> Path | io.BytesIO:
+    """The workbook without empty fills of cells, as LabVIEW writes them: Excel reads these, and openpyxl does not."""
+    with zipfile.ZipFile(path) as archive:
+        if STYLES not in archive.namelist() or not EMPTY_FILL.search(archive.read(STYLES)):
+            return path
+        copy = io.BytesIO()
+        with zipfile.ZipFile(copy, "w", zipfile.ZIP_DEFLATED) as made:
+            for name in archive.namelist():
+                content = archive.read(name)
+                made.writestr(name, EMPTY_FILL.sub(FILL, content) if name == STYLES else content)
+    copy.seek(0)
+    return copy
 
 
 def _refuse_large(path: Path, size: int) -> None:
