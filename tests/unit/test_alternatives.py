@@ -27,7 +27,7 @@ LAG, DRIFT = {"time_constant": 0.03}, {"rate": 2e-3}
 
 
 def fitted(begin: Model, truth: Model, delays: tuple[float, float] = (0.0203, 0.0151)) -> Fit:
-    series = prepare(records(truth, SHORT, delays=delays), 4)
+    series = prepare(records(truth, SHORT[:2], delays=delays), 4)
     return estimate(begin, series, noise=NOISE, max_step=1e-3)
 
 

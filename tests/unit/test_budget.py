@@ -43,7 +43,8 @@ def spent(monkeypatch: pytest.MonkeyPatch, *answers: bool) -> None:
 
 @cache
 def runs() -> list[Record]:
-    return records(hopper().with_element(CATALOGUE["coulomb_friction"], FRICTION), SHORT[:2])
+    whole = records(hopper().with_element(CATALOGUE["coulomb_friction"], FRICTION), SHORT[:2])
+    return [one.cut(2.0, 8.0) for one in whole]
 
 
 def by_motion() -> Diagnosis:

@@ -32,9 +32,9 @@ FIXED = ", fixed: true"
 
 
 def driven(truth: Model, unit: str, size: float) -> Record:
-    """20 s of a machine that a sum of sines drives, at 100 Hz with a little noise."""
+    """12 s of a machine that a sum of sines drives, at 100 Hz with a little noise."""
     rng = np.random.default_rng(3)
-    time = np.arange(0.0, 20.0, 0.01)
+    time = np.arange(0.0, 12.0, 0.01)
     lines = np.linspace(0.2, 2.5, 12)
     waves = np.sin(2.0 * np.pi * lines[:, None] * time + rng.uniform(0.0, 2.0 * np.pi, 12)[:, None])
     effort = size * waves.sum(axis=0)
@@ -140,7 +140,8 @@ def test_a_fit_that_leaves_more_than_a_fifth_of_the_motion_is_not_usable_and_say
     walking = replace(
         sliding,
         output=replace(
-            sliding.output, value=np.cumsum(np.random.default_rng(0).standard_normal(2000)) * 0.01
+            sliding.output,
+            value=np.cumsum(np.random.default_rng(0).standard_normal(len(sliding.output))) * 0.01,
         ),
     )
     found = identify(walking, slide(True)).to_dict()

@@ -17,7 +17,7 @@ from rhythmid.elements.element import DISSIPATIVE, ELAPSED, STEP
 from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.simulation.generated_history import PADE, DelayedSignal, HistoryLines, rational_past
-from rhythmid.simulation.kernel_source import history_module, kernel_module, pieces_module
+from rhythmid.simulation.kernel_source import INNER, history_module, kernel_module, pieces_module
 from rhythmid.simulation.machine_code import Module
 
 InputKind = Literal["force", "base_displacement", "base_acceleration", "reference"]
@@ -318,7 +318,7 @@ from {pieces_module().name} import piece_at, slope_at, value_at
 {head}{chr(10).join(imports)}
 
 
-@njit(error_model="numpy")
+@njit({INNER})
 def rhs({known}, {s}, {p}):
 {_indent(writer.lines, 1)}
     return {", ".join([rates, "y", "f", *history.returned])}
