@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from rhythmid.errors import InputError
+from rhythmid.record.bag import Bag
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.joint_messages import write_joint_bag
 from rhythmid.record.joint_record import JointSignals, load_joint_records
+from rhythmid.record.table import Table
 
 BAG = """
 joints: [hip, knee]
@@ -46,6 +48,18 @@ def test_every_joint_of_a_bag_has_a_record_of_its_own(tmp_path: Path):
     assert found.base is not None
     np.testing.assert_array_equal(found.base.output.value, MOTION[:, 2])
     assert found.cut(0.1, 0.5).span == pytest.approx((0.1, 0.498))
+
+
+def test_a_recording_of_several_joints_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    read: list[str] = []
+    table, blocks = Table.load.__func__, Bag.blocks
+    monkeypatch.setattr(Table, "load", classmethod(lambda of, path: read.append("table") or table(of, path)))
+    monkeypatch.setattr(Bag, "blocks", lambda self, *of: read.append("bag") or blocks(self, *of))
+    load_joint_records([recorded(tmp_path)], JointSignals.from_text(BAG))
+    np.savetxt(tmp_path / "run.csv", np.column_stack([TIME, MOTION]), delimiter=",")
+    text = "joints: [hip, knee]\ntime: {column: 0}\noutput: {column: [1, 2]}\neffort: {column: [2, 1]}\nbase: {column: 3}\n"
+    load_joint_records([tmp_path / "run.csv"], JointSignals.from_text(text))
+    assert read == ["bag", "table"]
 
 
 def test_columns_of_tables_go_by_name_or_by_place(tmp_path: Path):

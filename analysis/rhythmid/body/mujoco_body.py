@@ -325,7 +325,7 @@ class MujocoBody(Body):
         """
         of = hashlib.blake2b(digest_size=16)
         for one in (inertia.moments, inertia.centre, inertia.turn, *motion):
-            of.update(np.ascontiguousarray(one, dtype=float))
+            of.update(np.ascontiguousarray(one, dtype=float).data)
         key = (link, inertia.mass, len(motion[0]), of.digest())
         if (known := self._alone.get(key)) is not None:
             return known

@@ -26,6 +26,7 @@ from pydantic import TypeAdapter
 
 from rhythmid.document import Node, parse, read
 from rhythmid.errors import InputError
+from rhythmid.record.opened import Opened
 from rhythmid.record.read import read_record, read_tables
 from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
@@ -118,8 +119,9 @@ def joint_records(paths: Iterable[str | Path], signals: str | Path | None) -> li
 def read_joint_record(source: str | Path, signals: JointSignals) -> JointRecord:
     """Read one recording: a bag, or a table whose columns the signals name. A signals.yaml that names its tables is
     its own source."""
-    found = {joint: _read(source, one, signals.path) for joint, one in signals.joints.items()}
-    base = None if signals.base is None else _read(source, signals.base, signals.path)
+    opened = Opened.of([*signals.joints.values(), *([] if signals.base is None else [signals.base])])
+    found = {joint: _read(source, one, signals.path, opened) for joint, one in signals.joints.items()}
+    base = None if signals.base is None else _read(source, signals.base, signals.path, opened)
     scales: dict[str, dict[str, float]] = {}
     for joint, one in signals.joints.items():
         for role, channel in one.channels.items():
@@ -128,9 +130,9 @@ def read_joint_record(source: str | Path, signals: JointSignals) -> JointRecord:
     return JointRecord(name, found, base, signals.taken, signals.sampled, scales)
 
 
-def _read(source: str | Path, signals: Signals, path: Path) -> Record:
+def _read(source: str | Path, signals: Signals, path: Path, opened: Opened) -> Record:
     same = Path(source).resolve() == path.resolve()
-    record = read_tables(signals) if same else read_record(source, signals)
+    record = read_tables(signals, opened) if same else read_record(source, signals, opened)
     # with several joints, one that stands still contributes nothing by its effort alone
     if np.ptp(record.output.value) == 0.0:
         raise InputError(f"{record.name}: {record.output.source} never changes; nothing is learnt from it")

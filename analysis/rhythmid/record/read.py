@@ -1,7 +1,7 @@
 """Reads records from bags and tables, with the channels mapped by signals.yaml."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,13 @@ from rhythmid.errors import InputError
 from rhythmid.progress import Tell, counted, silent
 from rhythmid.record.arrival_bursts import without_bursts
 from rhythmid.record.bag import Bag, is_bag
-from rhythmid.record.block import Block, Topic
 from rhythmid.record.channel_quality import channel_quality
 from rhythmid.record.clocks import assumed_clock, clock_notes
-from rhythmid.record.columns import Columns, read_columns
+from rhythmid.record.columns import Columns
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.held_command import with_held_commands, with_hold
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
+from rhythmid.record.opened import Opened, fields_of
 from rhythmid.record.placeholder import Placeholder, placeholder_of
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
@@ -63,13 +63,16 @@ def load_records(
     return list(counted((read_record(path, signals) for path in given), len(given), "records read", tell))
 
 
-def read_record(source: str | Path, signals: Signals | str | Path | None = None) -> Record:
+def read_record(
+    source: str | Path, signals: Signals | str | Path | None = None, opened: Opened | None = None
+) -> Record:
     """Read one record.
 
     Parameters
     ----------
     source : a bag directory, an .mcap or .db3 file, a signals.yaml that names tables, or a table for `signals`.
     signals : mapping of the channels; by default the topics of rhythmid's own nodes.
+    opened : what was read of the source already, and what is read now.
 
     Times are relative to the first sample of any channel. A clock that started with the run (simulated time) keeps
     its own zero, as does the time column of a table, unless it counts from 1970. Messages out of order are sorted
@@ -95,7 +98,7 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
         raise InputError(f"{source}: no such file or directory")
     refuse_foreign(source)
     if signals is not None and table_suffix(source) in SUFFIXES:
-        return read_tables(signals.of_table(source))
+        return read_tables(signals.of_table(source), opened)
     if not is_bag(source):
         raise InputError(
             f"{source}: is neither a bag (directory, .mcap, .db3) nor a signals.yaml that names tables; "
@@ -103,15 +106,14 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
         )
     if signals is not None and signals.from_tables:
         raise InputError(f"{signals.path}: names tables, so it takes the place of the bag {source}")
-    return read_bag(Bag(source), signals)
+    return read_bag(Bag(source), signals, opened)
 
 
-def read_bag(bag: Bag, signals: Signals | None = None) -> Record:
+def read_bag(bag: Bag, signals: Signals | None = None, opened: Opened | None = None) -> Record:
     """Read a record from a bag. Raises InputError as `read_record` does."""
     chosen = signals or Signals.default()
-    wanted, run = _fields(chosen), list[bytes]()
-    blocks = bag.blocks(lambda topic: topic.name in wanted or is_run(topic))
-    columns = read_columns(_divert_run(blocks, run), wanted)
+    wanted = fields_of(chosen)
+    bag, columns, run = (opened or Opened()).bag(bag, wanted)
     description, notes = _description(run)
     if signals is None and chosen.channels["output"].topic not in bag.topics and description is not None:
         # rhythmid's own recordings state their namespace and joint
@@ -138,15 +140,16 @@ def read_bag(bag: Bag, signals: Signals | None = None) -> Record:
     return _finish(replace(record, start_ns=start_ns, hold=chosen.hold or "zero", run=description), chosen)
 
 
-def read_tables(signals: Signals) -> Record:
+def read_tables(signals: Signals, opened: Opened | None = None) -> Record:
     """Read a record from the tables that `signals` names. Raises InputError as `read_record` does."""
     for source in signals.channels.values():
         if source.file is None:
             raise InputError(
                 f"{source.place}'file:' is missing: whose column is it? Or give the table, and this file with --signals"
             )
+    opened = opened or Opened()
     tables = {
-        file: Table.load(file) for source in signals.channels.values() if (file := source.file) is not None
+        file: opened.table(file) for source in signals.channels.values() if (file := source.file) is not None
     }
     made, stale = dict[str, Samples](), dict[str, None]()
     merged = {file: _is_merged(table, signals) for file, table in tables.items()}
@@ -196,19 +199,6 @@ def _is_merged(table: Table, signals: Signals) -> bool:
     return bool(times) and is_merged(value for name, value in table.vectors() if name not in times)
 
 
-def is_run(topic: Topic) -> bool:
-    """Whether the topic holds descriptions of the experiment."""
-    return topic.type == "std_msgs/msg/String" and topic.name.rsplit("/", 1)[-1] == "run"
-
-
-def _divert_run(blocks: Iterable[Block], run: list[bytes]) -> Iterator[Block]:
-    for block in blocks:
-        if is_run(block.topic):
-            run.extend(block)
-        else:
-            yield block
-
-
 def _description(run: Sequence[bytes]) -> tuple[Mapping[str, Any] | None, list[str]]:
     """The newest description of the experiment, and a note if it cannot be read."""
     if not run:
@@ -218,13 +208,6 @@ def _description(run: Sequence[bytes]) -> tuple[Mapping[str, Any] | None, list[s
     except ValueError:
         said = None
     return (said, []) if isinstance(said, dict) else (None, ["the topic run does not carry a JSON object"])
-
-
-def _fields(signals: Signals) -> dict[str, list[Any]]:
-    wanted: dict[str, list[Any]] = {}
-    for source in signals.channels.values():
-        wanted.setdefault(source.topic, []).append(source.field)
-    return wanted
 
 
 def _from_columns(

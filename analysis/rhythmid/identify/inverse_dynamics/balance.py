@@ -311,8 +311,10 @@ class Balance:
         inertial = zero if motion.driven_by_base else model.mass.value * motion.acceleration
         if motion.coupling is not None:
             inertial = inertial + motion.coupling
+            known = model.parameters
             for name, (taken_at, column) in motion.links.items():
-                inertial = inertial + (model.value(name) - taken_at) * column
+                if (change := known[name].value - taken_at) != 0.0:
+                    inertial = inertial + change * column
         required = inertial - leg - others
         if late and motion.driven_by_base:
             required = required - sum(self._along(motion, t, model, zero, leg, zero) for t in late)
