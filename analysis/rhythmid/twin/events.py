@@ -1,8 +1,10 @@
 """Events: mismatches from beginning to end, in a form for users."""
 
+from collections import deque
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from rhythmid.twin.detector import WINDOWS
 from rhythmid.twin.isolation import DelayNow, Isolation
 from rhythmid.twin.twin import Status
 
@@ -16,7 +18,7 @@ class Event:
     since : time when it was first detected [s].
     until : time when it was last detected [s]; None while it lasts.
     peak : largest statistic: 0 in healthy operation, 1 at the threshold.
-    isolation, delays : as last detected.
+    isolation, delays : as last detected; when the change has ended, those of the last window before its end.
     diagnosis : verdict and names of a diagnosis of its last minute; None where there was none.
     """
 
@@ -55,11 +57,18 @@ class Event:
 
 
 class Events:
-    """The mismatches that a twin has reported."""
+    """The mismatches that a twin has reported.
+
+    A change that ends is detected for as long as the longest window still holds a part of it. Windows that hold the time after it as
+    well mix two states of the machine, and no single change explains them. So the location of an event that has ended is that of
+    one window length before its last detection.
+    """
 
     def __init__(self) -> None:
         self.found: list[Event] = []
         self._seen = 0.0  # time when the last one was last detected
+        # detections of the present one, from the last window that a change which is no longer detected has filled
+        self._windows: deque[Status] = deque()
 
     @property
     def current(self) -> Event | None:
@@ -72,14 +81,26 @@ class Events:
         if status.since is None:
             if now is not None:
                 self.found[-1] = replace(now, until=self._seen)
+        elif status.isolation is None:
+            return  # late messages: nothing is known of this window
         elif now is None:
-            self._seen = status.time
+            self._windows.clear()
+            self._detect(status)
             self.found.append(Event(status.since, None, status.mismatch, status.isolation, status.delays))
         elif status.mismatch >= 1.0:
-            self._seen = status.time
+            self._detect(status)
             self.found[-1] = replace(
                 now, peak=max(now.peak, status.mismatch), isolation=status.isolation, delays=status.delays
             )
+        else:  # the change has ended, unless it is detected again
+            during = self._windows[0]
+            self.found[-1] = replace(now, isolation=during.isolation, delays=during.delays)
+
+    def _detect(self, status: Status) -> None:
+        self._seen = status.time
+        self._windows.append(status)
+        while len(self._windows) > 1 and self._windows[1].time <= self._seen - sum(WINDOWS):
+            self._windows.popleft()
 
     def diagnosed(self, since: float, answer: dict[str, Any]) -> None:
         """Add a diagnosis to the event that began at `since`."""

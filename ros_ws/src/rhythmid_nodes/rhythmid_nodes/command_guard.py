@@ -130,7 +130,7 @@ class CommandGuard(GraphNode):
 
     def _listen(self) -> None:
         """Subscribe to commands when somebody receives the guard's, so that whoever commands waits for that."""
-        if not self._receivers.missing():
+        if self.configured and not self._receivers.missing():
             self._search.cancel()
             subscribe_informed(self, JointState, "command", self._on_command, stream(lockstep=False))
 
@@ -154,7 +154,7 @@ class CommandGuard(GraphNode):
             return
         now = self._wall.now()
         self._watch.hear(sample, now)
-        if not self.tripped and self._engaged(now) and (danger := self._watch.danger(now)):
+        if self._obeys and self._engaged(now) and (danger := self._watch.danger(now)):
             self._stop(danger)
 
     def _engaged(self, now_ns: int) -> bool:
@@ -177,7 +177,9 @@ class CommandGuard(GraphNode):
             self._give(stamp_ns, wanted)
         if self._hold.lapses:
             self.notice(lapse_notice(self.values["command_timeout"]))
-        if danger and engaged and not self.tripped:
+        if (
+            danger and engaged and self._obeys
+        ):  # a guard that is being ended hears no measurements, and sends zero
             self._stop(danger)
 
     def _give(self, stamp_ns: int, wanted: float) -> None:

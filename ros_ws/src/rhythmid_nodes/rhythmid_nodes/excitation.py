@@ -1,7 +1,8 @@
 """excitation: publishes u(t) on `excitation` (or `command_topic`, as `command_type`) when told to, and stops by itself when the machine is not safe.
 
 Services `~/start` and `~/stop` (std_srvs/Trigger); when deactivated, it first fades to zero. In real time it subscribes to `joint_states` and stops at once, with a
-last command of zero, if the measurements violate their limits (see `watch`), there is no subscriber any more, or another node commands.
+last command of zero, if the measurements violate their limits (see `watch`), there is no subscriber any more, or another node commands. It fades out
+if nothing is recorded any more.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from rhythmid.experiment import Safety, ramped
 from .authority import UNNAMED, Authority
 from .clock import Clock, Grid
 from .command import STAMPED, TYPES, Commander
+from .companions import Companions
 from .joint_state import JointStateReader
 from .lateness import Lateness
 from .lockstep import Credit
-from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
-from .node_state import NodeState
+from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run, supervised
 from .parameters import Parameter
 from .qos import latched, stream
 from .receivers import Receivers
@@ -39,6 +40,7 @@ from .watch_parameters import PARAMETERS as WATCHED
 from .watch_parameters import limits
 
 _FAR = float("inf")
+_COMPANY_PERIOD = 0.5  # seconds between two requests whether the recorder and the receivers still work
 PARAMETERS = (
     RATE,
     TIME_MODE,
@@ -58,7 +60,7 @@ PARAMETERS = (
     Parameter("run", "{}", "JSON published on `run`"),
     Parameter("subscribers", 1, "subscribers of the commands to wait for before starting", "", (0, 1000)),
     Parameter("unattended", False, "start as soon as ready and end the process a second after the last sample"),
-    Parameter("recorder", "recorder", "node that an unattended start waits for until it is active; empty: none"),
+    Parameter("recorder", "recorder", "node that records: an unattended start waits until it is active, and who loses it fades out; empty: none"),
     Parameter("consumers", ["plant", "recorder"], "lockstep: nodes whose announcements the excitation waits for"),
 )  # fmt: skip
 
@@ -106,10 +108,11 @@ class ExcitationNode(GraphNode):
                 self._wall, self.period_ns, self._tick, self.values["priority"], self.values["catch_up"]
             )
             self.workers.append(self._grid)
-        self._recorder = None
+        self._companions = Companions(self, self._output.publisher, self.values["recorder"])
+        self._recorded = False  # whether the recorder was active at the start
+        if not self.lockstep and not supervised():
+            self.create_timer(_COMPANY_PERIOD, self._look_for_company)
         if self.values["unattended"]:
-            if self.values["recorder"]:
-                self._recorder = NodeState(self, self.values["recorder"])
             self.create_timer(0.05, self._attend)
 
     def activate(self) -> None:
@@ -188,10 +191,7 @@ class ExcitationNode(GraphNode):
 
     def _unrecorded(self) -> str:
         """Message that the recorder is not active, for an unattended run; else empty."""
-        recorder = self._recorder
-        if recorder is None or self._state != "idle" or recorder.active:
-            return ""
-        return f"{recorder.name} is not active"
+        return self._companions.unrecorded if self.values["unattended"] and self._state == "idle" else ""
 
     def _other_graphs(self) -> list[str]:
         """Namespaces of the other excitations in this DDS domain; each is reported once."""
@@ -224,14 +224,28 @@ class ExcitationNode(GraphNode):
         if not self.active or self.transitions.leaving:
             return
         if self._state == "idle":
-            if self._recorder is not None:
-                self._recorder.ask()
+            self._companions.ask()
             self._start()
         elif self._state in ("finished", "stopped"):
             if self.lockstep and not self.tripped and self._credit.taken < len(self._effort):
                 return
             self._ended_at = self._ended_at or time.monotonic()
             self.done = time.monotonic() - self._ended_at > 1.0
+
+    def _look_for_company(self) -> None:
+        """Stop when no node receives the commands any more, and fade out when the recorder that was active at the start is lost."""
+        if not self.active:
+            return
+        self._companions.ask()
+        if self._state not in ("running", "ramping"):
+            return
+        gone = self._receivers.missing(self._companions.lost) if self.values["subscribers"] else ""
+        if gone:
+            with self._lock:
+                self._abort(self._wall.now(), gone)
+        lost = self._companions.unrecorded if self._recorded else ""
+        if lost and self._fade_out(f"nothing is recorded any more: {lost}"):
+            self.get_logger().error(f"excitation stopped: {self.tripped}; the effort fades to zero")
 
     def _start(self) -> str:
         """Start playing from the beginning; returns the reason if this is refused."""
@@ -246,6 +260,7 @@ class ExcitationNode(GraphNode):
                 return "; ".join(obstacles)
             self._sent, self._fade_from, self._lateness = 0, None, Lateness(self.period_ns)
             self.tripped = ""
+            self._recorded = not self._companions.unrecorded
             self._start_ns = 0 if self.lockstep else (self._wall.now() // self.period_ns + 2) * self.period_ns
             self._enter("running")
         if self.lockstep:
@@ -257,12 +272,12 @@ class ExcitationNode(GraphNode):
         response.success = not response.message
         return response
 
-    def _fade_out(self) -> bool:
-        """Begin to fade to zero, if it plays."""
+    def _fade_out(self, failure: str = "") -> bool:
+        """Begin to fade to zero, if it plays, because of a `failure` or on request."""
         with self._lock:
             playing = self._state == "running"
             if playing:
-                self._state, self._fade_from = "ramping", self._sent
+                self._state, self._fade_from, self.tripped = "ramping", self._sent, failure
         return playing
 
     def _enter(self, state: str, reason: str = "") -> None:
@@ -331,7 +346,7 @@ class ExcitationNode(GraphNode):
         if self._fade_from is None:
             self._enter("finished")
         else:
-            self._enter("stopped", "asked to stop")
+            self._enter("stopped", self.tripped or "asked to stop")
 
     def _halt(self, stamp_ns: int, reason: str) -> str:
         """Stop at once, without fading, with a last command of zero. Returns the line for the log."""

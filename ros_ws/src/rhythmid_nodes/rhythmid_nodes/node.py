@@ -66,6 +66,11 @@ AUTOSTART = Parameter("autostart", True, "configures and activates itself; else 
 _NO_SIM_TIME = "parameter use_sim_time = True: the nodes take no time from /clock; for simulated time use time_mode = 'lockstep'"
 
 
+def supervised() -> bool:
+    """Whether another process starts this one, says what is waited for, and ends the run when a node dies."""
+    return _SUPERVISOR in os.environ
+
+
 def lapse_notice(timeout: float) -> str:
     """Log message of a node that holds a command for at most `timeout` seconds."""
     return f"a command was not renewed within {timeout:g} s: it fades to zero"
@@ -84,7 +89,7 @@ class GraphNode(ManagedNode):
         self.tripped = ""  # why the node stopped its work early, if it did; the process then ends with code 1
         self.diagnostics = Diagnostics(self, self._all_figures, self._all_obstacles, lambda: self.tripped)
         self._waiting_lines = Waiting()
-        if _SUPERVISOR not in os.environ:
+        if not supervised():
             self.create_timer(_WAITING_PERIOD, self._tell_waiting)
         self.manage(self.values["autostart"])
 

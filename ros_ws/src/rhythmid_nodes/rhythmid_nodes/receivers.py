@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from rclpy.node import Node
@@ -53,20 +54,25 @@ class Receivers:
     def __init__(self, node: Node, publisher: Publisher) -> None:
         self._node, self._publisher = node, publisher
         self._topic, self._kind = publisher.topic_name, type_name(publisher.msg_type)
-        self._received_by = (0, 0)  # connected and known subscriptions when there was last a receiver
+        self._received_by = (0, 0, 0)  # connected, known and dead subscribers when there was last a receiver
 
-    def missing(self) -> str:
-        """Message that there is no receiver; empty if there is one."""
+    def missing(self, lost: Mapping[str, str] = MappingProxyType({})) -> str:
+        """Message that there is no receiver; empty if there is one. `lost` are dead subscribers that the middleware still knows, by
+        their full names, with what is known about each."""
         matched = self._publisher.get_subscription_count()
-        known = matched, self._node.count_subscribers(self._topic)
+        known = matched, self._node.count_subscribers(self._topic), len(lost)
         if matched and known == self._received_by:
             return ""
-        found = [
+        everyone = [
             (f"{info.node_namespace.rstrip('/')}/{info.node_name}", info.topic_type)
             for info in self._node.get_subscriptions_info_by_topic(self._topic)
         ]
+        found = [one for one in everyone if one[0] not in lost]
+        matched -= len(everyone) - len(found)
         services = {name for name, _ in self._node.get_service_names_and_types()} if found else ()
         missing = nobody_receives(self._topic, self._kind, found, matched, services)
         if not missing:
             self._received_by = known
+        elif lost:
+            return f"{missing} ({', '.join(lost.values())})"
         return missing
