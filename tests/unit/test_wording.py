@@ -109,5 +109,8 @@ def test_a_delay_that_alone_explains_the_records_is_given_in_the_summary():
     _, decision = decided(contest(NOMINAL, friction(), late))
     said = longer_delay(0.01227, 9e-6, decision)
     told = summary_of(decision, [], FitQuality(0.1, 0.1), FitQuality(0.01, 0.01), "motion", said)
-    assert told == "The input is delayed by 12.2700 ± 0.009 ms, longer than was given, and that explains the records."
+    assert (
+        told
+        == "The input is delayed by 12.2700 ± 0.009 ms, longer than was given, and that explains the records."
+    )
     assert longer_delay(0.01227, 9e-6, decided(contest(NOMINAL, friction()))[1]) is None
