@@ -21,7 +21,8 @@ class JointEffect:
     For a link's mass, inertia, centre of mass or payload, `link` names the link, and the joint is the one that moves it. `share` is relative to
     the joint's mismatch. `heldout_gain` is the reduction of the joint's error on data that no fit has seen, as a share of the
     effort. `together` is the probability that the effect, or one of those listed in its place, is missing. `other_links` are further links, whose
-    masses the records do not separate from that of `link`. For `base_tilt` share and gain are those of the joint that shows it best.
+    masses the records do not separate from that of `link`. For `base_tilt` share and gain are those of the joint that shows it best; for
+    `gear_compliance`, whose evidence is that of the other joints, those of its own.
     """
 
     joint: str | None

@@ -12,9 +12,11 @@ from rhythmid.diagnose.constants import BLIND, STATED
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.joints.base_tilt import BaseTilt
 from rhythmid.diagnose.joints.equivalents import probability_together, shared_among
+from rhythmid.diagnose.joints.gear_compliance import GearCompliance
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import OF_LINKS, JointResult, name_of
 from rhythmid.diagnose.joints.misfit import error_of
+from rhythmid.diagnose.joints.row_agreement import agreeing, words_of
 from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.places import SENTENCES
 from rhythmid.identify.inverse_dynamics.estimate import size_of
@@ -31,9 +33,11 @@ EQUATIONS = {  # for quantities that are not elements: slot, meaning, and the na
     "link_mass_and_centre": ("body", "m, c, I → m′, c′, I′", "mass, x, y, z"),
     "payload": ("body", "point mass m at the end of the link", "mass"),
     "base_tilt": ("body", "g → g′, its size kept", "angle, x, y, z"),
+    "gear_compliance": ("gear", "q → q − τ/k at the link, q at the encoder", "stiffness, compliance"),
     "actuator_delay": ("actuator", "f(t) → f(t − τ)", "delay"),
     "input_delay": ("command", "r(t) → r(t − τ)", "delay"),
 }
+WHERE = {"gear": "in its gear"}  # slots that no element has
 IN_CONTACT = (
     "What was recorded in contact with the ground, or near it, is left out: the contact's force is not known."
 )
@@ -50,17 +54,21 @@ def compose_machine(
     notes: Sequence[str] = (),
     delay: ReferenceDelay | None = None,
     tilt: BaseTilt | None = None,
+    gears: Mapping[str, GearCompliance] | None = None,
 ) -> MachineDiagnosis:
-    """The diagnosis; `links` are the corrected masses, inertias or payloads, `tilt` that of the base, `stated` the labels stated at each joint."""
-    missing = [
-        _effect(found[joint], answers[joint], label)
+    """The diagnosis; `links` are the corrected masses, inertias or payloads, `tilt` that of the base, `gears` those that yield, `stated` the labels
+    stated at each joint."""
+    open_ = [
+        (joint, label)
         for joint, labels in stated.items()
         for label in labels
         if label.removeprefix(f"{BODY}.") not in links
     ]
+    missing = once([_effect(machine, found[joint], answers[joint], label) for joint, label in open_])
     missing += [_link(machine, one, _of_same_link(one, links)) for one in links.values()]
     if tilt is not None:
         missing.append(_of_base(tilt, answers[tilt.shown]))
+    missing += [_of_gear(one, answers[joint]) for joint, one in (gears or {}).items()]
     of_links = _quantities_of(links)
     holding = [one for one in missing if _holds(one, answers, of_links)]
     missing.sort(key=lambda one: (one not in holding, -one.heldout_gain))
@@ -106,7 +114,7 @@ def compose_machine(
         },
         next_experiment=_next(answers, named, unknown, undecided),
         scoring=next(iter(answers.values())).scoring,
-        joints=dict(answers),
+        joints=agreeing(answers, holding, elsewhere_found(machine, open_, holding)),
         not_judged=dict(refused),
         families={joint: one.families for joint, one in answers.items() if one.families},
         assumptions=assumptions_of(machine, found, answers),
@@ -115,8 +123,9 @@ def compose_machine(
     )
 
 
-def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
+def _effect(machine: Machine, one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
     decision, fitted = one.result.decision, one.result.chosen
+    place = split(label.removeprefix(f"{BODY}."))[0] if label.startswith(f"{BODY}.") else None
     gain = _gain(one)
     known = fitted.fit.model.term(label)
     if known is not None:
@@ -127,7 +136,7 @@ def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
         slot, equation, own = EQUATIONS[element]
         parameters = {own: _value(one, answer, label)}
     return JointEffect(
-        one.joint,
+        one.joint if place is None else machine.body.joint_of(place),
         element,
         slot,
         equation,
@@ -135,8 +144,34 @@ def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
         decision.probability[label] / shared_among(one, label),
         parameters,
         gain,
+        place,
         together=probability_together(one, label),
     )
+
+
+def once(effects: Sequence[JointEffect]) -> list[JointEffect]:
+    """The effects, of which a value of a link that several joints show is one: that of the joint that is surest of it."""
+    best: dict[tuple[str | None, str], JointEffect] = {}
+    for one in effects:
+        known = best.get((one.link, one.element))
+        if one.link and (known is None or one.probability > known.probability):
+            best[one.link, one.element] = one
+    return [one for one in effects if not one.link or best[one.link, one.element] is one]
+
+
+def elsewhere_found(
+    machine: Machine, open_: Sequence[tuple[str, str]], holding: Sequence[JointEffect]
+) -> dict[str, list[str]]:
+    """Joints at which a value of a link was found that another joint moves, with the words for it."""
+    sure = {(one.link, one.element): words_of(one) for one in holding if one.link}
+    said: dict[str, list[str]] = {}
+    for joint, label in open_:
+        if not label.startswith(f"{BODY}."):
+            continue
+        element, link = name_of(joint, label)
+        if (link, element) in sure and machine.body.joint_of(link) != joint:
+            said.setdefault(joint, []).append(sure[link, element])
+    return said
 
 
 def _value(one: JointResult, answer: Diagnosis, label: str) -> Estimate:
@@ -183,18 +218,24 @@ def _link(machine: Machine, wrong: WrongLink, same: Sequence[WrongLink]) -> Join
 def _of_base(tilt: BaseTilt, shown: Diagnosis) -> JointEffect:
     """The tilt of the base, with what it explains of the joint that shows it best."""
     slot, equation, _ = EQUATIONS["base_tilt"]
-    before, after = (error_of(shown.fit[name]) for name in ("refitted_nominal", "augmented"))
-    share = 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
+    share, gain = _explained_at(shown)
+    return JointEffect(None, "base_tilt", slot, equation, share, tilt.probability, tilt.values, gain)
+
+
+def _of_gear(gear: GearCompliance, answer: Diagnosis) -> JointEffect:
+    """The gear of a joint that yields, with what it explains there."""
+    slot, equation, _ = EQUATIONS["gear_compliance"]
+    share, gain = _explained_at(answer)
     return JointEffect(
-        None,
-        "base_tilt",
-        slot,
-        equation,
-        max(share, 0.0),
-        tilt.probability,
-        tilt.values,
-        max(before - after, 0.0),
+        gear.joint, "gear_compliance", slot, equation, share, gear.probability, gear.values, gain
     )
+
+
+def _explained_at(answer: Diagnosis) -> tuple[float, float]:
+    """Share of a joint's mismatch that is explained, and reduction of its error."""
+    before, after = (error_of(answer.fit[name]) for name in ("refitted_nominal", "augmented"))
+    share = 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
+    return max(share, 0.0), max(before - after, 0.0)
 
 
 def _quantities_of(links: Mapping[str, WrongLink]) -> dict[str, tuple[str, ...]]:
@@ -218,30 +259,29 @@ def summary_of_joints(
 
     For joints with unknown physics it names the quantity that the mismatch depends on; for undecided joints, the candidates.
     """
-    said, doubted, told = [], [], set[str]()
+    said, doubted, beside, told = [], [], [], set[str]()
     for one in missing:
         if one.joint is None or (one.link and one.link in told):
             continue
         others = [] if one.probability >= STATED else _in_its_place(one, answers, of_links)
-        what = " or ".join([_in_words(one), *others])
+        what = " or ".join([words_of(one), *others])
         if not _holds(one, answers, of_links):
             chance = f"{one.together:.2f} together" if others else f"{one.probability:.2f}"
-            doubted.append(f"{one.joint}: {what} (probability {chance})")
+            (beside if _sure_in_part(one, answers) else doubted).append(
+                f"{one.joint}: {what} (probability {chance})"
+            )
             continue
         told |= {one.link} if one.link else set()
         said.append(f"{one.joint}: {what}")
     words = "" if tilt is None else f"{tilt.words[0].upper()}{tilt.words[1:]}."
     words += f" The model is wrong at {'; '.join(said)}." if said else ""
+    words += f" Whatever else is wrong there: {'; '.join(beside)}." if beside else ""
     words += f" In doubt: {'; '.join(doubted)}." if doubted else ""
     for why, joints in _alike(unknown, answers).items():
         words += f" At {', '.join(joints)} {why[0].lower()}{why[1:]}"
     for why, joints in _alike(undecided, answers).items():
         words += f" At {', '.join(joints)} the records do not decide: {why}"
     return words.strip() or "Nothing of practical size is missing at any joint."
-
-
-def _in_words(one: JointEffect) -> str:
-    return f"the {one.of_link}" if one.link else in_words(one.element)
 
 
 def _holds(one: JointEffect, answers: Mapping[str, Diagnosis], of_links: Mapping[str, Sequence[str]]) -> bool:
@@ -256,8 +296,15 @@ def _holds(one: JointEffect, answers: Mapping[str, Diagnosis], of_links: Mapping
         return False
     if answer is None or answer.verdict == "missing_physics":
         return True
-    part = one.link is None and answer.joint_probability < STATED <= one.probability
-    return not part and error_of(answer.fit["augmented"]) < BLIND
+    return not _sure_in_part(one, answers) and error_of(answer.fit["augmented"]) < BLIND
+
+
+def _sure_in_part(one: JointEffect, answers: Mapping[str, Diagnosis]) -> bool:
+    """Whether an effect is sure although the explanation of its joint, which leaves little, is not sure as a whole."""
+    answer = None if one.joint is None else answers.get(one.joint)
+    if answer is None or one.link is not None or answer.verdict == "missing_physics":
+        return False
+    return answer.joint_probability < STATED <= one.probability and error_of(answer.fit["augmented"]) < BLIND
 
 
 def _in_its_place(
@@ -267,7 +314,7 @@ def _in_its_place(
     is sure that one of them is."""
     same = of_links.get(one.link, ()) if one.link else ()
     sure = one.probability * len(same) >= STATED
-    values = [_in_words(replace(one, element=name)) for name in same if sure and name != one.element]
+    values = [words_of(replace(one, element=name)) for name in same if sure and name != one.element]
     known = answers[one.joint].indistinguishable if one.joint is not None and one.joint in answers else ()
     groups = [group for group in known if one.element in group]
     return values + [in_words(name) for group in groups for name in group if name != one.element]
@@ -288,7 +335,7 @@ def _location(
         first = missing[0]
         if first.joint is None:
             return JointLocation(None, first.slot, "in the mounting of the base")
-        where = SENTENCES.get(first.slot, "in the inertia of the body")
+        where = WHERE.get(first.slot) or SENTENCES.get(first.slot, "in the inertia of the body")
         return JointLocation(first.joint, first.slot, f"at joint {first.joint}, {where}")
     if unknown:
         return JointLocation(unknown[0], "force", f"at joint {unknown[0]}, {SENTENCES['force']}")

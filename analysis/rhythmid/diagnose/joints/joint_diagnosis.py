@@ -22,6 +22,7 @@ from rhythmid.diagnose.joints.augmented import augmented
 from rhythmid.diagnose.joints.base_tilt import BaseTilt, likely_tilt
 from rhythmid.diagnose.joints.contradiction import Searched, contradicted
 from rhythmid.diagnose.joints.equivalents import equivalent_names, equivalents
+from rhythmid.diagnose.joints.gear_compliance import GearCompliance, likely_gear
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
@@ -134,6 +135,7 @@ def diagnose_machine(
     told = () if records[0].sampled else tuple(told_of(best.leads))
     put_right = (one.beside(machine) for one in best.links.values())
     late = () if best.delay is None else (best.delay.told,)
+    yielding = (one.words for one in best.gears.values())
     notes = (
         *machine.body.notes,
         *said,
@@ -141,10 +143,20 @@ def diagnose_machine(
         *told,
         *late,
         *put_right,
+        *yielding,
         *misfits(answers, braking(best.found, machine)),
     )
     diagnosis = compose_machine(
-        machine, best.found, answers, best.stated, best.links, best.refused, notes, best.delay, best.tilt
+        machine,
+        best.found,
+        answers,
+        best.stated,
+        best.links,
+        best.refused,
+        notes,
+        best.delay,
+        best.tilt,
+        best.gears,
     )
     return MachineAnswer(
         diagnosis, augmented(best.machine, best.found, best.stated, best.links), best.found, best.given
@@ -155,8 +167,8 @@ def diagnose_machine(
 class _Explained:
     """The results of all joints.
 
-    `machine` has the corrected parameters of links and the `tilt` of the base; the `leads` [s] and the `delay` of references were taken into
-    account. `given` are the results with the body as it is given.
+    `machine` has the corrected parameters of links and the `tilt` of the base; the `gears` that yield, the `leads` [s] and the `delay` of
+    references were taken into account. `given` are the results with the body as it is given.
     """
 
     machine: Machine
@@ -166,6 +178,7 @@ class _Explained:
     leads: Mapping[str, float]
     delay: ReferenceDelay | None
     tilt: BaseTilt | None
+    gears: Mapping[str, GearCompliance]
     given: Mapping[str, JointResult]
 
     @property
@@ -182,7 +195,7 @@ class _Explained:
             for joint, one in self.found.items()
             if one.result.decision.verdict != "consistent" and not stated[joint] and _different(one)
         ]
-        shared = len(self.links) + (self.tilt is not None)
+        shared = len(self.links) + len(self.gears) + (self.tilt is not None)
         return shared + sum(map(len, stated.values())) + len(open_)
 
 
@@ -202,18 +215,27 @@ def _explained(
     refused, given = {**unsigned, **refused}, found
     most = max(MOST_LINKS, len(machine.body.links))
     tilt: BaseTilt | None = None
-    weighed: Machine | None = None  # the machine whose mounting has been compared with the laws of its joints
+    gears: dict[str, GearCompliance] = {}
+    weighed: Machine | None = (
+        None  # the machine whose shared causes have been compared with the laws of its joints
+    )
     while len(links) < most and len(balances.refuted) < most and budget.allows(correction, WEIGHED):
-        if tilt is None and weighed is not machine:
-            weighed, tilt = machine, likely_tilt(balances, records, found)
-            if tilt is not None:
-                tell(tilt.words)
-                machine = machine.with_gravity(tilt.gravity)
-                balances = JointBalances.of(machine, records, balances)
+        if weighed is not machine:
+            weighed = machine
+            shared = _shared_cause(balances, records, found, tilt)
+            if shared is not None:
+                tell(shared.words)
+                if isinstance(shared, BaseTilt):
+                    tilt, machine = shared, machine.with_gravity(shared.gravity)
+                    balances = JointBalances.of(machine, records, balances)
+                else:
+                    gears[shared.joint], weighed = shared, None
+                    balances = balances.with_gears({**balances.gears, shared.joint: shared.gear})
                 unseen = JointBalances.of(machine, holdout, balances) if holdout else None
                 delay = reference_delay(balances, balances.computed) if balances.computed else None
                 better, refused_now = _searched(balances, unseen, list(found), catalogue, tell, budget, delay)
                 found, refused = {**found, **better}, {**refused, **refused_now}
+                continue
         best = _heaviest(found, set(links))
         if best is None:
             break
@@ -246,7 +268,18 @@ def _explained(
             links[wrong.parameter] = wrong
             machine, balances, delay, unseen = tried, changed, late, seen
         found, refused = {**found, **better}, {**refused, **refused_now}
-    return _Explained(machine, found, refused, links, balances.leads, delay, tilt, given)
+    return _Explained(machine, found, refused, links, balances.leads, delay, tilt, gears, given)
+
+
+def _shared_cause(
+    balances: JointBalances,
+    records: Sequence[JointRecord],
+    found: Mapping[str, JointResult],
+    tilt: BaseTilt | None,
+) -> BaseTilt | GearCompliance | None:
+    """The cause of the machine as a whole with the strongest evidence; one `tilt` is enough."""
+    likely = (likely_tilt(balances, records, found) if tilt is None else None, likely_gear(balances, found))
+    return max((one for one in likely if one is not None), key=lambda one: one.weight, default=None)
 
 
 def _searched(

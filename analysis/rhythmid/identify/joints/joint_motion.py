@@ -26,6 +26,8 @@ from rhythmid.identify.inverse_dynamics.bandwidth import (
 )
 from rhythmid.identify.inverse_dynamics.motion import FINER, Motion, Stretch, low_pass
 from rhythmid.identify.inverse_dynamics.reference_path import Reference
+from rhythmid.identify.joints.body_motion import BodyMotion
+from rhythmid.identify.joints.elastic_gear import ElasticGear, deflected
 from rhythmid.identify.joints.joint_stretch import JointStretch, joint_stretches
 from rhythmid.model import Model, Term
 from rhythmid.record.joint_record import JointRecord, Taken
@@ -60,21 +62,6 @@ def nothing(t):
 
 
 @dataclass(frozen=True, eq=False)
-class BodyMotion:
-    """Motions of one stretch: pose, rate and acceleration (n, nv) of the whole body below `cut` [Hz], and the
-    forces (n, nv) that they require."""
-
-    stretch: JointStretch
-    time: Array
-    pose: Array
-    rate: Array
-    acceleration: Array
-    force: Array
-    period: float
-    every: int
-
-
-@dataclass(frozen=True, eq=False)
 class JointBalances:
     """The effort balances of all joints: each joint's path as a model with one axis, and its motions.
 
@@ -82,7 +69,8 @@ class JointBalances:
     `leads` [s] of other joints are the leads of references in their recorded efforts, already removed from the
     motions. `rotor_like` holds by joint the link parameters with the same effect there as the rotor's inertia, with
     the inertia [kg m²] per unit of each. `refuted` holds pairs of a joint and a link's parameter that is not freed
-    there, because the other joints refute its estimate.
+    there, because the other joints refute its estimate. `gears` are the joints whose gears yield: there `bodies` are the
+    motions of the links, and `motions` those of the encoders.
     """
 
     machine: Machine
@@ -95,6 +83,7 @@ class JointBalances:
     leads: Mapping[str, float] = field(default_factory=dict)
     rotor_like: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     refuted: frozenset[tuple[str, str]] = frozenset()
+    gears: Mapping[str, ElasticGear] = field(default_factory=dict)
     # of these balances alone: a copy with other motions has none
     _made: dict[tuple[str, float], Balance] = field(init=False, default_factory=dict, repr=False)
 
@@ -145,17 +134,9 @@ class JointBalances:
         )
         computed = tuple(joint for joint in machine.joints if joint in stretches[0].reference)
         made = cls(
-            machine,
-            models,
-            motions,
-            bandwidths,
-            bodies,
-            period,
-            computed,
-            rotor_like=rotor_like,
-            refuted=refuted,
-        )
-        return made.with_leads(alike.leads) if alike else made
+            machine, models, motions, bandwidths, bodies, period, computed, rotor_like=rotor_like, refuted=refuted
+        )  # fmt: skip
+        return made.with_leads(alike.leads).with_gears(alike.gears) if alike else made
 
     def with_leads(self, leads: Mapping[str, float]) -> "JointBalances":
         """The balances after removing these leads [s] of the references from the recorded efforts."""
@@ -171,6 +152,25 @@ class JointBalances:
                 for motion, body in zip(self.motions[joint], self.bodies, strict=True)
             ]
         return replace(self, motions=motions, leads={**self.leads, **leads})
+
+    def with_gears(self, gears: Mapping[str, ElasticGear], columns: bool = True) -> "JointBalances":
+        """The balances with these gears in place of its own; without new `columns` the effects of links' values stay."""
+        if not gears and not self.gears:
+            return self
+        rigid = [one.rigid or one for one in self.bodies]
+        bodies = deflected(self, rigid, gears)
+        motions = {}
+        for joint, made in self.motions.items():
+            own, inertia = self.machine.body.joints[joint].velocity, self.models[joint].mass.value
+            motions[joint] = [
+                replace(
+                    motion,
+                    coupling=body.force[:, own] - inertia * motion.acceleration,
+                    links=_links_along(self.machine, own, motion, body) if columns else motion.links,
+                )
+                for motion, body in zip(made, bodies, strict=True)
+            ]
+        return replace(self, motions=motions, bodies=bodies, gears=dict(gears))
 
     def without(self, joint: str, parameter: str) -> "JointBalances":
         """The balances in which the search at a joint does not free a parameter of a link."""
@@ -206,6 +206,18 @@ class JointBalances:
                 motions, self.bandwidths[joint], self.period, CLEAR
             )
         return self._made[joint, late]
+
+
+def _links_along(
+    machine: Machine, own: int, motion: Motion, body: BodyMotion
+) -> dict[str, tuple[float, Array]]:
+    """The effects of links' values on one velocity, along the motion of the links."""
+    names = [name.removeprefix(f"{BODY}.") for name in motion.links]
+    columns = machine.body.columns(names, body.pose, body.rate, body.acceleration)[:, own]
+    return {
+        name: (taken, np.ascontiguousarray(column))
+        for (name, (taken, _)), column in zip(motion.links.items(), columns.T, strict=True)
+    }
 
 
 def _later(motion: Motion, model: Model, late: float) -> Motion:

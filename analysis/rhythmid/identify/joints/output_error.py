@@ -20,8 +20,9 @@ from rhythmid.body.machine import FIXED, Machine
 from rhythmid.body.simulate import run_steps
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
+from rhythmid.identify.joints.body_motion import BodyMotion
 from rhythmid.identify.joints.correlation import Correlations
-from rhythmid.identify.joints.joint_motion import BodyMotion, JointBalances
+from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Channel
 from rhythmid.simulation.signal import Hold, continuous
