@@ -8,7 +8,6 @@ Robot. Res. 11 (1992) 362). So each joint has the balance of a machine with one 
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +27,7 @@ from rhythmid.identify.inverse_dynamics.motion import FINER, Motion, Stretch, lo
 from rhythmid.identify.inverse_dynamics.reference_path import Reference
 from rhythmid.identify.joints.body_motion import BodyMotion
 from rhythmid.identify.joints.elastic_gear import ElasticGear, deflected
+from rhythmid.identify.joints.joint_balance import JointBalance
 from rhythmid.identify.joints.joint_stretch import JointStretch, joint_stretches
 from rhythmid.model import Model, Term
 from rhythmid.record.joint_record import JointRecord, Taken
@@ -37,23 +37,7 @@ Array = NDArray[np.float64]
 # cut-off periods at both ends of a stretch in which the filter's transient is several times the noise (measured on
 # flights between contacts)
 CLEAR = 1.5
-SHORT = 400  # largest number of samples in a stretch for which its filter is a matrix
 FAINT = 1e-3  # share of a joint's effort below which the effect of a link on it is neglected
-
-
-class JointBalance(Balance):
-    """A balance of many short stretches: the filter for each length is a matrix that is computed once."""
-
-    def filtered(self, signal: Array, period: float) -> Array:
-        if len(signal) > SHORT:
-            return super().filtered(signal, period)
-        return _filter(len(signal), period, self.bandwidth.effort) @ signal
-
-
-@lru_cache(maxsize=512)
-def _filter(length: int, period: float, frequency: float) -> Array:
-    """The zero-phase low-pass as a matrix (length, length)."""
-    return np.ascontiguousarray(low_pass(np.eye(length), period, frequency))
 
 
 def nothing(t):
