@@ -1,10 +1,10 @@
 """A saved model has the effects that the answer states, and no others."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
-from rhythmid.diagnose.joints.stated_fit import stated_fit
+from rhythmid.diagnose.joints.stated_fit import stated_fit, stated_parameters
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
 
@@ -26,6 +26,13 @@ class Found:
     elements: tuple[str, ...]
     fit: Fit
 
+    @property
+    def model(self) -> Model:
+        return self.fit.model
+
+    def std(self) -> dict[str, float]:
+        return {}
+
 
 def found(*labels: str) -> Any:
     model = PLAIN
@@ -46,3 +53,13 @@ def test_effects_that_are_not_stated_are_not_in_the_model_that_is_saved():
     assert [term.label for term in kept.fit.model.terms] == ["coulomb_friction"]
     assert stated_fit(result(both, alone), ("coulomb_friction", "linear_spring")) is both
     assert stated_fit(result(both, alone), ()).elements == ()
+
+
+def test_the_size_of_a_stated_law_is_not_shared_with_one_that_is_not_stated():
+    """A second friction in the same fit would hold a part of the first one's force."""
+    both, alone = found("coulomb_friction", "linear_spring"), found("coulomb_friction")
+    both = replace(both, fit=Fit(both.model.with_values({"coulomb_friction.force": 0.7})))
+    told = stated_parameters(result(both, alone), ("coulomb_friction",))
+    assert told["coulomb_friction.force"].value == 1.0
+    assert "linear_spring.stiffness" in told  # of the chosen hypothesis, for the joint's own answer
+    assert stated_parameters(result(both, alone), ())["coulomb_friction.force"].value == 0.7

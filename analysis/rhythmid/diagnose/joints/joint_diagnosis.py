@@ -28,6 +28,7 @@ from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, nam
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.link_centre import feels
 from rhythmid.diagnose.joints.misfit import braking, misfits
+from rhythmid.diagnose.joints.stated_fit import stated_parameters
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
@@ -118,7 +119,7 @@ def diagnose_machine(
     balances = balances_of(machine, records)
     correction = CORRECTION * (time.monotonic() - began)
     unsigned = unsigned_joints(records)
-    best = None
+    best: _Explained | None = None
     for reading in likely_readings(balances, records):
         tried = _explained(machine, reading, records, holdout, known, tell, spent, unsigned, correction)
         best = tried if best is None or tried.causes < best.causes else best
@@ -131,11 +132,11 @@ def diagnose_machine(
             f"{', '.join(j for j, one in best.refused.items() if one == each)}: {each}" for each in reasons
         ]
         raise InputError(f"no joint can be judged: {'; '.join(why)}")
-    answers = {joint: _answer(one, best.given.get(joint, one)) for joint, one in best.found.items()}
+    stated, known = best.stated, {**best.found, **best.given}
+    answers = {joint: _answer(one, known[joint], stated[joint]) for joint, one in best.found.items()}
     told = () if records[0].sampled else tuple(told_of(best.leads))
     put_right = (one.beside(machine) for one in best.links.values())
     late = () if best.delay is None else (best.delay.told,)
-    yielding = (one.words for one in best.gears.values())
     notes = (
         *machine.body.notes,
         *said,
@@ -143,7 +144,7 @@ def diagnose_machine(
         *told,
         *late,
         *put_right,
-        *yielding,
+        *(one.words for one in best.gears.values()),
         *misfits(answers, braking(best.found, machine)),
     )
     diagnosis = compose_machine(
@@ -159,7 +160,7 @@ def diagnose_machine(
         best.gears,
     )
     return MachineAnswer(
-        diagnosis, augmented(best.machine, best.found, best.stated, best.links), best.found, best.given
+        diagnosis, augmented(best.machine, best.found, stated, best.links), best.found, best.given
     )
 
 
@@ -272,11 +273,8 @@ def _explained(
 
 
 def _shared_cause(
-    balances: JointBalances,
-    records: Sequence[JointRecord],
-    found: Mapping[str, JointResult],
-    tilt: BaseTilt | None,
-) -> BaseTilt | GearCompliance | None:
+    balances: JointBalances, records: Sequence[JointRecord], found: Mapping[str, JointResult], tilt: BaseTilt | None
+) -> BaseTilt | GearCompliance | None:  # fmt: skip
     """The cause of the machine as a whole with the strongest evidence; one `tilt` is enough."""
     likely = (likely_tilt(balances, records, found) if tilt is None else None, likely_gear(balances, found))
     return max((one for one in likely if one is not None), key=lambda one: one.weight, default=None)
@@ -390,9 +388,10 @@ def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, J
     return None if best is None else best[1:]
 
 
-def _answer(one: JointResult, given: JointResult) -> Diagnosis:
+def _answer(one: JointResult, given: JointResult, stated: Sequence[str]) -> Diagnosis:
     """The answer at a joint; its nominal error is that with the body as it is `given`, before any of its values was corrected."""
-    made = compose_effort(one.case, one.result, ())
+    sizes = stated_parameters(one.result, stated)
+    made = replace(compose_effort(one.case, one.result, ()), parameters=sizes)
     if given is not one:
         nominal = compose_effort(given.case, given.result, ()).fit["refitted_nominal"]
         made = replace(made, fit={**made.fit, "refitted_nominal": nominal})

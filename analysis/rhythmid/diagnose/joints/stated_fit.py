@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from rhythmid.diagnose.answer.compose_effort import effort_parameters
+from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.run import EffortResult
 
@@ -29,3 +31,10 @@ def stated_fit(result: EffortResult, stated: Sequence[str]) -> Fitted:
     model = chosen.fit.model
     kept = replace(model, terms=tuple(term for term in model.terms if term.label not in further))
     return replace(chosen, fit=replace(chosen.fit, model=kept))
+
+
+def stated_parameters(result: EffortResult, stated: Sequence[str]) -> dict[str, Estimate]:
+    """Values at a joint, by name: those of the fit with the stated labels, beside which no other effect holds a part of their size; of effects that
+    are not stated, those of the chosen hypothesis."""
+    found = effort_parameters(result.chosen)
+    return {**found, **effort_parameters(stated_fit(result, stated))} if stated else found
