@@ -59,6 +59,8 @@ def _main(
         typer.echo(BEGIN, nl=False)
 
 
+HELP_WIDTH, HELP_MARGIN = 50, 2  # columns that click's help takes at least, and leaves free on the right
+
 for _module in pkgutil.iter_modules(commands.__path__):
     if _module.name not in PARTS:
         _name = _module.name
@@ -74,7 +76,7 @@ def main() -> None:
     if RUN not in {entry.name for entry in entries}:
         app.command(name=RUN, context_settings={"ignore_unknown_options": True})(_run)
     try:
-        code = app(spread(sys.argv[1:]), prog_name=NAME, standalone_mode=False)
+        code = app(spread(sys.argv[1:]), prog_name=NAME, standalone_mode=False, terminal_width=_narrow())
     except InputError as error:
         _refuse(str(error))
     except (typer.Abort, KeyboardInterrupt):
@@ -90,6 +92,12 @@ def main() -> None:
         _refuse(describe())
     else:
         sys.exit(code if isinstance(code, int) else 0)
+
+
+def _narrow() -> int | None:
+    """Columns of a terminal in which the help would not fit: click writes at least 50 unless it is told. None for a wider one."""
+    columns = shutil.get_terminal_size().columns
+    return max(columns - HELP_MARGIN, 1) if columns < HELP_WIDTH + HELP_MARGIN else None
 
 
 def _run(arguments: Annotated[list[str] | None, typer.Argument(metavar="EXPERIMENT")] = None) -> None:

@@ -242,6 +242,7 @@ class Experiment:
                     "stale_after": self.safety.stale_after,
                     "envelope": [low, high],
                     "max_speed": self.safety.max_speed,
+                    "position_unit": self.model.units.position,
                     "frozen_after": self.safety.frozen_after,
                     "max_gap": self.safety.max_gap,
                     "run": _json(self.description()),

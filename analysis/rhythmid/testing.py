@@ -147,6 +147,7 @@ def run_graph(request: pytest.FixtureRequest, tmp_path: Path) -> RunGraph:
         replace: Mapping[str, str] | None = None,
         timeout: float = TIMEOUT,
     ) -> GraphRun:
+        __tracebackhide__ = True  # a failure is shown at the test's own line
         from rhythmid.experiment import Experiment
 
         bag = tmp_path / f"graph_run_{next(number)}"
@@ -170,6 +171,7 @@ def _completed(experiment: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 def _run(words: list[str], replace: Mapping[str, str], folder: Path, timeout: float) -> str:
     """Output of `rhythmid`; the test fails if it does not succeed within `timeout` seconds."""
+    __tracebackhide__ = True
     environment = {key: value for key, value in os.environ.items() if key != "ROS_DOMAIN_ID"}
     environment["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), environment.get("PATH", "")])
     for name, line in replace.items():
@@ -179,20 +181,28 @@ def _run(words: list[str], replace: Mapping[str, str], folder: Path, timeout: fl
         cwd=folder, env=environment, stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
     )  # fmt: skip
+    late = False
     try:
         said, _ = process.communicate(timeout=timeout)
     except subprocess.TimeoutExpired:
-        process.send_signal(signal.SIGINT)
-        try:
-            said, _ = process.communicate(timeout=GRACE)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            said, _ = process.communicate()
-        pytest.fail(f"the run did not end within {timeout:g} s:\n{said}")
+        late = True
+        said = _interrupted(process)
     except BaseException:  # such as the user's Ctrl-C: no node may outlive the test
         process.send_signal(signal.SIGINT)
         process.wait(GRACE)
         raise
+    if late:
+        pytest.fail(f"the run did not end within {timeout:g} s and was stopped:\n{said}")
     if process.returncode != 0:
         pytest.fail(f"rhythmid run ended with exit code {process.returncode}:\n{said}")
     return said
+
+
+def _interrupted(process: subprocess.Popen[str]) -> str:
+    """Stop a run that takes too long; what it said."""
+    process.send_signal(signal.SIGINT)
+    try:
+        return process.communicate(timeout=GRACE)[0]
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.communicate()[0]

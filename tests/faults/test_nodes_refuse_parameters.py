@@ -55,7 +55,7 @@ def test_ros_arguments_that_cannot_be_parsed_are_refused_likewise(arguments, sai
         (
             "delay_injector",
             "delai:=0.04",
-            "error: unknown parameter delai; this node has autostart, catch_up, delay, delay_from",
+            "error: unknown parameter delai; did you mean delay?",
         ),
         (
             "delay_injector",

@@ -51,6 +51,10 @@ def test_it(run_graph):
     assert "rhythmid run ended with exit code 1" in done.stdout
     assert "measurement_delay] no sensor" in done.stdout
     assert "measurement_delay ended with exit code 2" in done.stdout
+    assert (
+        "Traceback" not in done.stdout and "KeyboardInterrupt" not in done.stdout
+    )  # of nodes that are ended
+    assert "rhythmid/testing.py" not in done.stdout  # the failure is shown at the line of the test
 
 
 def test_runs_side_by_side_do_not_hear_one_another(tmp_path):

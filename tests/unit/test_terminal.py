@@ -72,6 +72,11 @@ def test_help_on_a_narrow_terminal_cuts_nothing_off():
     assert "--clock-offset-std" in text and "…" not in text
 
 
+def test_the_help_is_no_wider_than_a_narrow_terminal():
+    text = python_m("--help", COLUMNS="40").stdout
+    assert max(map(len, text.splitlines())) <= 40
+
+
 def examples() -> Sequence[tuple[str, str]]:
     import importlib
 

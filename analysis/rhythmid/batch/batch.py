@@ -121,7 +121,8 @@ class Batch(Result):
             axis.errorbar([place for place, _ in shown], values, halves, fmt="o", label=group or None)
         axis.set(xlabel="run", ylabel=f"{pretty_name(one.name)} [{one.unit}]")
         if any(one.groups):
-            axis.legend()
+            # above the axis: inside, it would hide error bars
+            axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(one.groups), frameon=False)
         return axis
 
 

@@ -54,6 +54,10 @@ class Task:
     options: Options
     key: str = ""
 
+    def __repr__(self) -> str:
+        """Short, because tasks are the keys of mappings that people print."""
+        return f"Task({self.name!r}, {self.command!r})"
+
     @property
     def variant(self) -> str:
         """Options of an identification that differ from the defaults, in words. Answers that differ in these options are not compared."""
@@ -163,14 +167,19 @@ def _tasks(
 
 
 def _matches(patterns: Iterable[str], folder: Path, place: Node) -> tuple[Path, ...]:
-    """Recordings that the globs find, each once, in the order of the globs and of their names."""
+    """Recordings that the globs find, each once, in the order of the globs and of their names, numbers by their size."""
     found: dict[Path, None] = {}
     for pattern in patterns:
-        matches = sorted(glob.glob(pattern, root_dir=folder, recursive=True))
+        matches = sorted(glob.glob(pattern, root_dir=folder, recursive=True), key=_natural)
         if not matches:
             place.fail(f"{pattern!r} matches nothing in {folder}; a glob is relative to the manifest")
         found |= dict.fromkeys(folder / match for match in matches)
     return tuple(found)
+
+
+def _natural(name: str) -> list[str | int]:
+    """Key of the order in which run6 comes before run11: the numbers in a name count as numbers."""
+    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name)]
 
 
 def _paths(named: Mapping[str, str] | None, folder: Path) -> dict[str, Path | None]:

@@ -113,7 +113,7 @@ def watch(
         console.print(f"{left_out} samples of the output that stand far off their neighbours are left out")
     console.print(
         f"innovations are {number(100.0 * result['nrmse'], 2)} % of the motion in healthy operation; "
-        f"{false_alarms:g} false alarms a day are allowed"
+        f"allowed: {false_alarms:g} false {'alarm' if false_alarms == 1.0 else 'alarms'} a day"
     )
     if json is not None:
         write_json(json, result)

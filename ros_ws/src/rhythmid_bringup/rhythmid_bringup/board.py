@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rhythmid_nodes.diagnostics import PREFIX
+from rhythmid_nodes.twin import UNSTAMPED
 
 MODEL = "/model"  # suffix of the status that a twin reports of the machine
 RATE, LOST = " rate [Hz]", " lost"  # suffixes of the keys of a signal's figures
@@ -70,7 +71,8 @@ def _add_signals(table: Table, figures: Mapping[str, str]) -> None:
     for key, rate in figures.items():
         if key.endswith(RATE):
             topic = key.removesuffix(RATE)
-            late = (figures.get(topic + end, "") for end in (LATE_P99, LATE_MAX))
+            unknown = "no stamps" if f"{topic} {UNSTAMPED}" in figures else ""
+            late = (figures.get(topic + end, unknown) for end in (LATE_P99, LATE_MAX))
             table.add_row(topic, rate, *map(_short, late), figures.get(topic + LOST, ""))
 
 

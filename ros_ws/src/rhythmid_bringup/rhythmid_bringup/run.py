@@ -99,7 +99,8 @@ def run_graph(
         raise InputError(outcome.sentence)
     if outcome.code == 0 and not supervisor.observed.run:  # the user stopped it before the excitation played
         shutil.rmtree(experiment.record.path, ignore_errors=True)
-        console.print(STOPPED)
+        waited = f"; it waited for {supervisor.waited_for}" if supervisor.waited_for else ""
+        console.print(escape(STOPPED + waited))
         return 0
     mend(experiment.record.path)
     show(console, experiment, supervisor.observed, outcome)

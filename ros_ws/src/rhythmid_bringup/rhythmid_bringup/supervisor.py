@@ -28,6 +28,7 @@ from .observer import Observer
 from .processes import Supervised, end
 
 READY_WITHIN = 180.0  # seconds; importing ROS and compiling the model take most of it on a busy machine
+TELL_WAITING = 20.0  # seconds between two lines on what a run without a terminal waits for; nodes on a busy machine are ready before
 STALLED_AFTER = 30.0  # seconds
 FIGURES_WITHIN = 2.0  # seconds; every node reports its figures once a second
 GRAPH = "graph"  # the process that holds all nodes of a composed layout
@@ -71,7 +72,8 @@ class Supervisor:
         self._experiment, self._folder, self._environment = experiment, folder, environment
         self._console, self._interrupted = console, interrupted
         self._processes: list[Supervised] = []
-        self._began = False
+        self._began = self._closing = False
+        self.waited_for = ""  # by whom and for what, until the excitation plays
         self._lockstep = experiment.time.mode == "lockstep"
         self._length = experiment.count * experiment.time.period_ns * 1e-9
         self._nodes = [spec.name for spec in experiment.nodes() if spec.name not in self._replaced]
@@ -96,6 +98,7 @@ class Supervisor:
             if outcome.code == 1 and silent:
                 told = f"nothing was heard from {', '.join(silent)} for {FIGURES_WITHIN:g} s"
                 outcome = Outcome(1, f"{outcome.sentence}; {told}")
+            self._closing = True
             end([process for process in self._processes if process.name != "recorder"], self._listen)
             end(self._processes, self._listen)  # the recorder still receives the last messages of the others
             for process in self._processes:
@@ -113,7 +116,7 @@ class Supervisor:
         self._executor.spin_once(timeout_sec=0.05)
 
     def _tell(self, name: str, line: str) -> None:
-        if self._interrupted() and not self._began:
+        if (self._interrupted() or self._closing) and not self._began:
             return  # a node that is ended while it loads has only a traceback to say
         self._console.print(f"[dim]{escape(f'[{name}]')}[/] {escape(line)}")
 
@@ -174,26 +177,34 @@ class Supervisor:
     def _wait_until_ready(self, observer: Observer) -> Outcome | None:
         """Wait until every node is ready and the excitation has started; returns the reason if this fails."""
         patience = time.monotonic() + READY_WITHIN
+        tell_at = time.monotonic() + TELL_WAITING
         refusal: str | None = None
         with self._console.status("waiting for the nodes") as status:
             while not observer.state:
+                self.waited_for = missing = self._missing(observer, refusal)
                 if trouble := self._trouble(observer):
                     return trouble
                 self._bring_up_excitation(observer)
-                silent = [name for name in self._nodes if name not in observer.obstacles]
-                waiting = [f"{name}: {why}" for name, why in observer.obstacles.items() if why]
-                if not silent and not waiting:
+                heard = all(name in observer.obstacles for name in self._nodes)
+                if heard and not any(observer.obstacles.values()):
                     refusal = observer.ask_start() or refusal
-                missing = (
-                    "; ".join([*(f"{name}: not up yet" for name in silent), *waiting])
-                    or refusal
-                    or "the start"
-                )
                 if time.monotonic() > patience:
                     return Outcome(1, f"not ready after {READY_WITHIN:g} s: {missing}")
                 status.update(f"waiting for {missing}")
+                if not self._console.is_terminal and time.monotonic() > tell_at:
+                    tell_at += TELL_WAITING
+                    self._console.print(f"waiting for {escape(missing)}")
                 self._listen()
         return None
+
+    def _missing(self, observer: Observer, refusal: str | None) -> str:
+        """Which nodes are not ready and why; else the `refusal` of the start."""
+        silent = [f"{name}: not up yet" for name in self._nodes if name not in observer.obstacles]
+        waiting = [f"{name}: {why}" for name, why in observer.obstacles.items() if why]
+        missing = "; ".join([*silent, *waiting]) or refusal or "the start"
+        if self._replaced:
+            missing += f" (in the place of {', '.join(self._replaced)} a command of yours runs)"
+        return missing
 
     def _play(self, observer: Observer) -> Outcome:
         """Wait for the end of the run, the end of a node, or an interruption by the user."""

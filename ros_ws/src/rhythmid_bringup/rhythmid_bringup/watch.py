@@ -28,6 +28,7 @@ from .board import drawn
 from .environment import run_environment
 from .processes import Supervised, end
 from .run import interruptions
+from .watch_lines import WatchLines
 
 NAMESPACE = "/hopper"  # of rhythmid's own nodes, whose topics are watched where no signals are given
 REFRESH = 4.0  # a second
@@ -88,17 +89,27 @@ def watch(**options: Any) -> int:
 
 
 def _show(process: Supervised, console: Console, interrupted: Callable[[], bool]) -> None:
-    """Draw the display until the user or the node ends it; it stays on the screen if the user has ended it."""
+    """Draw the display until the user or the node ends it; it stays on the screen if the user has ended it. Without a terminal, print
+    a line at each change instead, and one at the end."""
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     board, executor = Board(), EventsExecutor()
     executor.add_node(board)
     try:
-        with Live(drawn({}), console=console, refresh_per_second=REFRESH, transient=True) as live:
+        if console.is_terminal:
+            with Live(drawn({}), console=console, refresh_per_second=REFRESH, transient=True) as live:
+                while process.returncode is None and not interrupted():
+                    executor.spin_once(timeout_sec=0.1)
+                    live.update(drawn(board.newest))
+            if process.returncode is None:
+                console.print(drawn(board.newest))
+        else:
+            lines = WatchLines()
             while process.returncode is None and not interrupted():
                 executor.spin_once(timeout_sec=0.1)
-                live.update(drawn(board.newest))
-        if process.returncode is None:
-            console.print(drawn(board.newest))
+                for line in lines.take(board.newest):
+                    console.print(line, markup=False, highlight=False, soft_wrap=True)
+            if process.returncode is None:
+                console.print(lines.end(), markup=False, highlight=False, soft_wrap=True)
     finally:
         executor.shutdown()
         board.destroy_node()

@@ -151,6 +151,7 @@ class CommandGuard(GraphNode):
     def _on_measurement(self, data: bytes) -> None:
         sample = self._reader.read(data)
         if sample is None:
+            self._watch.hear_others(self._reader.names(data))
             return
         now = self._wall.now()
         self._watch.hear(sample, now)
@@ -175,7 +176,7 @@ class CommandGuard(GraphNode):
         danger = self._watch.danger(self._wall.now()) if wanted or engaged else ""
         if not danger and (wanted or engaged):
             self._give(stamp_ns, wanted)
-        if self._hold.lapses:
+        if self._hold.lapses and self._obeys:
             self.notice(lapse_notice(self.values["command_timeout"]))
         if (
             danger and engaged and self._obeys

@@ -45,7 +45,7 @@ class Diagnostics:
         self._node, self._values, self._obstacles, self._tripped = node, values, obstacles, tripped
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", latched(1))
         self._noticed: set[str] = set()
-        self._notices: deque[str] = deque()
+        self._notices: deque[tuple[Callable[[str], object], str]] = deque()
         self._told = ""
         self._told_at = -1.0
         self._timer = node.create_timer(_LOOK_PERIOD, self._look)
@@ -55,11 +55,16 @@ class Diagnostics:
         a clock thread does not have."""
         if text not in self._noticed:
             self._noticed.add(text)
-            self._notices.append(text)
+            self._notices.append((self._node.get_logger().warning, text))
+
+    def inform(self, text: str) -> None:
+        """Have `text` logged as information, by the executor, each time."""
+        self._notices.append((self._node.get_logger().info, text))
 
     def _look(self) -> None:
         while self._notices:
-            self._node.get_logger().warning(self._notices.popleft())
+            log, text = self._notices.popleft()
+            log(text)
         message = self._message()
         now = time.monotonic()
         if message != self._told or now - self._told_at >= 1.0:

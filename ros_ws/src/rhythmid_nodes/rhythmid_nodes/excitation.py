@@ -26,43 +26,20 @@ from rhythmid.experiment import Safety, ramped
 
 from .authority import UNNAMED, Authority
 from .clock import Clock, Grid
-from .command import STAMPED, TYPES, Commander
+from .command import STAMPED, Commander
 from .companions import Companions
+from .excitation_parameters import PARAMETERS
 from .joint_state import JointStateReader
 from .lateness import Lateness
 from .lockstep import Credit
-from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run, supervised
+from .node import GraphNode, run, supervised
 from .parameters import Parameter
 from .qos import latched, stream
 from .receivers import Receivers
 from .watch import Watch
-from .watch_parameters import PARAMETERS as WATCHED
 from .watch_parameters import limits
 
-_FAR = float("inf")
 _COMPANY_PERIOD = 0.5  # seconds between two requests whether the recorder and the receivers still work
-PARAMETERS = (
-    RATE,
-    TIME_MODE,
-    JOINT,
-    WINDOW,
-    COUNT,
-    PRIORITY,
-    CATCH_UP,
-    Parameter("excitation", "", "what to play, in JSON: the `excitation` of an experiment file"),
-    Parameter("folder", ".", "where file names in it start"),
-    Parameter("max_effort", 0.0, "largest |u|; what exceeds it is clamped", "N", (0.0, _FAR)),
-    Parameter("ramp", 0.0, "fading in at the start and out at the end or on stop", "s", (0.0, 3600.0)),
-    *WATCHED,
-    Parameter("command_type", STAMPED, "message type of the commands", choices=tuple(TYPES)),
-    Parameter("command_topic", "excitation", "topic of the commands"),
-    Parameter("command_joints", None, "order of a Float64MultiArray's joints; not given: the one joint", items=str),
-    Parameter("run", "{}", "JSON published on `run`"),
-    Parameter("subscribers", 1, "subscribers of the commands to wait for before starting", "", (0, 1000)),
-    Parameter("unattended", False, "start as soon as ready and end the process a second after the last sample"),
-    Parameter("recorder", "recorder", "node that records: an unattended start waits until it is active, and who loses it fades out; empty: none"),
-    Parameter("consumers", ["plant", "recorder"], "lockstep: nodes whose announcements the excitation waits for"),
-)  # fmt: skip
 
 
 class ExcitationNode(GraphNode):
@@ -146,11 +123,13 @@ class ExcitationNode(GraphNode):
         if not isinstance(spec, dict):
             raise InputError("parameter excitation must be a JSON object with a 'type'")
         excitation = build(spec, values["folder"])
+        self._played = str(spec.get("type", "a command"))
         count = values["count"] or round(excitation.duration * values["rate"])
         grid = np.arange(count, dtype=np.int64) * self.period_ns * np.float64(1e-9)
+        unit = "N m" if values["position_unit"] == "rad" else "N"
         if excitation.peak > values["max_effort"]:
             self.get_logger().warning(
-                f"the excitation's peak of {excitation.peak:g} N is clamped to max_effort = {values['max_effort']:g} N"
+                f"the excitation's peak of {excitation.peak:g} {unit} is clamped to max_effort = {values['max_effort']:g} {unit}"
             )
         safety = Safety(max_effort=values["max_effort"], ramp=values["ramp"])
         return ramped(excitation, safety, grid, count * self.period_ns * 1e-9)
@@ -187,7 +166,17 @@ class ExcitationNode(GraphNode):
     def _unheard(self) -> str:
         """Message on missing subscribers; empty if there are none."""
         matched, wanted = self._output.publisher.get_subscription_count(), self.values["subscribers"]
-        return f"{matched} of {wanted} subscribers of {self._authority.topic}" if matched < wanted else ""
+        if matched >= wanted:
+            return ""
+        return f"{matched} of {wanted} subscribers of {self._authority.topic}{self._unready_guards()}"
+
+    def _unready_guards(self) -> str:
+        """Names of command guards, which subscribe when they are ready, while the excitation waits; else empty."""
+        if self._state != "idle":
+            return ""
+        nodes = self.get_node_names_and_namespaces()
+        guards = sorted(f"{space.rstrip('/')}/{name}" for name, space in nodes if name == "command_guard")
+        return f" ({', '.join(guards)} subscribes when the robot receives its commands)" if guards else ""
 
     def _unrecorded(self) -> str:
         """Message that the recorder is not active, for an unattended run; else empty."""
@@ -261,6 +250,10 @@ class ExcitationNode(GraphNode):
             self._sent, self._fade_from, self._lateness = 0, None, Lateness(self.period_ns)
             self.tripped = ""
             self._recorded = not self._companions.unrecorded
+            if (
+                not supervised()
+            ):  # else the progress is shown; logged here, because a clock thread has no time for it
+                self.get_logger().info(self._announcement())
             self._start_ns = 0 if self.lockstep else (self._wall.now() // self.period_ns + 2) * self.period_ns
             self._enter("running")
         if self.lockstep:
@@ -347,6 +340,21 @@ class ExcitationNode(GraphNode):
             self._enter("finished")
         else:
             self._enter("stopped", self.tripped or "asked to stop")
+        if not supervised() and not self.tripped:
+            how = self._state if self._fade_from is None else "faded out as asked"
+            self.diagnostics.inform(
+                f"excitation {how}: {self._sent} samples, {self._sent / self.values['rate']:g} s"
+            )
+
+    def _announcement(self) -> str:
+        """What is played, for how long, and who records it."""
+        recorder = self._companions.recorder
+        by = (
+            f"recorded by {recorder.name}"
+            if recorder is not None and recorder.active
+            else "no recorder is active"
+        )
+        return f"excitation starts: {self._played}, {len(self._effort) / self.values['rate']:g} s, {by}"
 
     def _halt(self, stamp_ns: int, reason: str) -> str:
         """Stop at once, without fading, with a last command of zero. Returns the line for the log."""
@@ -359,6 +367,7 @@ class ExcitationNode(GraphNode):
         with self._lock:
             if UNNAMED in self.tripped:
                 self.tripped = conflict
+                self.report(f"excitation stopped: {conflict}; {self.HALTED}")
                 self._enter("stopped", conflict)
             self._abort(self._wall.now(), conflict)
 
@@ -366,11 +375,12 @@ class ExcitationNode(GraphNode):
         """Stop, if it plays, because the run has failed."""
         if self._state in ("running", "ramping"):
             self.tripped = danger
-            self.get_logger().error(self._halt(stamp_ns, danger))
+            self.report(self._halt(stamp_ns, danger))
 
     def _on_measurement(self, data: bytes) -> None:
         sample = self._reader.read(data)
         if sample is None:
+            self._watch.hear_others(self._reader.names(data))
             return
         now = self._wall.now()
         self._watch.hear(sample, now)

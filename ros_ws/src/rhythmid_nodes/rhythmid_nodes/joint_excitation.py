@@ -6,6 +6,7 @@ stopped keeps the last references, and sets forces to zero.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from sensor_msgs.msg import JointState
 
 from rhythmid.body.joint_experiment import JointExcitation, JointExperiment, JointWatch, command_field
 
-from .excitation import PARAMETERS as OF_ONE_AXIS
 from .excitation import ExcitationNode
+from .excitation_parameters import PARAMETERS as OF_ONE_AXIS
 from .joint_plant import EXPERIMENT, loaded
 from .joint_states import JointStatesReader, JointStatesWriter
 from .node import run
@@ -45,7 +46,9 @@ class JointCommander:
 class JointsWatch:
     """Judges the measurements of all joints, each by its own limits."""
 
-    def __init__(self, experiment: JointExperiment, joints: tuple[str, ...], topic: str) -> None:
+    def __init__(
+        self, experiment: JointExperiment, joints: tuple[str, ...], topic: str, units: Mapping[str, str]
+    ) -> None:
         safety = experiment.safety
         self._watches: dict[str, Watch] = {}
         for joint in joints:
@@ -57,6 +60,7 @@ class JointsWatch:
                     own.max_speed,
                     safety.frozen_after,
                     safety.max_gap,
+                    unit=units.get(joint, "m"),
                 ),
                 f"joint {joint} on {topic}",
             )
@@ -65,6 +69,12 @@ class JointsWatch:
         """Store a measurement of every joint."""
         for watch, sample in zip(self._watches.values(), samples):
             watch.hear(sample, arrived_ns)
+
+    def hear_others(self, joints: Sequence[str]) -> None:
+        """Note which joints a message names that lacks some."""
+        for joint, watch in self._watches.items():
+            if joint not in joints:
+                watch.hear_others(joints)
 
     def danger(self, now_ns: int) -> str:
         """Reason why the machine must not be excited now, and the joint; empty if it may."""
@@ -84,6 +94,7 @@ class JointExcitationNode(ExcitationNode):
 
     def _command(self) -> NDArray[np.float64]:
         self._experiment, self._machine = loaded(self.values["experiment"])
+        self._played = "the commands of all joints"
         known = self._experiment.excitation
         joints = self._machine.joints
         self._middle = np.array([known.get(joint, JointExcitation()).offset for joint in joints])
@@ -94,7 +105,9 @@ class JointExcitationNode(ExcitationNode):
 
     def _judge(self) -> JointsWatch:
         self._reader = JointStatesReader(self._machine.joints)
-        return JointsWatch(self._experiment, self._machine.joints, self.resolve_topic_name("joint_states"))
+        joints = self._machine.joints
+        units = {joint: "rad" if self._machine.body.joints[joint].rotational else "m" for joint in joints}
+        return JointsWatch(self._experiment, joints, self.resolve_topic_name("joint_states"), units)
 
     def _commander(self) -> JointCommander:
         publisher = self.create_publisher(JointState, "command", stream(self.lockstep))

@@ -96,6 +96,13 @@ class JointStateReader:
         ]
         return Sample(stamp_of(data), *values)
 
+    @staticmethod
+    def names(data: bytes) -> list[str]:
+        """The joints that a message names."""
+        if data[:2] != LITTLE_ENDIAN:
+            return list(deserialize_message(data, JointState).name)
+        return [name.decode(errors="replace") for name in layout(data)[0]]
+
     def _read_slowly(self, data: bytes) -> Sample | None:
         message = deserialize_message(data, JointState)
         if self._joint not in message.name:

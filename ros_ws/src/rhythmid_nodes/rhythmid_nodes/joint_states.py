@@ -44,6 +44,11 @@ class JointStatesReader:
             for places in self._places
         ]
 
+    @staticmethod
+    def names(data: bytes) -> list[str]:
+        """The joints that a message names."""
+        return JointStateReader.names(data)
+
     def _learn(self, data: bytes) -> bool:
         names, arrays = layout(data)
         if any(joint not in names for joint in self._joints):

@@ -86,6 +86,7 @@ class GraphNode(ManagedNode):
             raise InputError(_NO_SIM_TIME)
         self.add_on_set_parameters_callback(_refuse_sim_time)
         self.lockstep = self.values["time_mode"] == "lockstep"
+        self._unnamed = ""  # an error that waits for the name of a node
         self.tripped = ""  # why the node stopped its work early, if it did; the process then ends with code 1
         self.diagnostics = Diagnostics(self, self._all_figures, self._all_obstacles, lambda: self.tripped)
         self._waiting_lines = Waiting()
@@ -122,11 +123,24 @@ class GraphNode(ManagedNode):
         if self.tripped and UNNAMED not in self.tripped:
             return
         self.tripped = reason
-        self.get_logger().error(f"stopped: {reason}")
+        self.report(f"stopped: {reason}")
         if UNNAMED in reason:
             self.create_timer(_NAMING, self.end)
         else:
             self.end()
+
+    def report(self, line: str) -> None:
+        """Log an error, once: a line about an unnamed node waits until its name is known, `_NAMING` seconds at most."""
+        self._unnamed = line if UNNAMED in line else ""
+        if self._unnamed:
+            self.create_timer(_NAMING, self._report_unnamed)
+        else:
+            self.get_logger().error(line)
+
+    def _report_unnamed(self) -> None:
+        line, self._unnamed = self._unnamed, ""
+        if line:
+            self.get_logger().error(line)
 
     def notice(self, text: str) -> None:
         """Have `text` logged as a warning, once; clock threads use this."""
@@ -144,6 +158,7 @@ class GraphNode(ManagedNode):
             self.finish()
         for worker in self.workers:
             worker.stop()
+        self._report_unnamed()
         self.diagnostics.publish_last()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -77,6 +78,8 @@ class Parameter:
     def _cast(self, value: Any, wanted: type) -> Any:
         if wanted is float and type(value) is int:
             return float(value)  # `delay: 0` in a parameter file means 0.0
+        if wanted is int and type(value) is float and value.is_integer():
+            return int(value)  # and `rate: 500.0` means 500
         if type(value) is not wanted:
             raise InputError(
                 f"parameter {self.name} = {value!r} must be {_WORDS[wanted]}: {self.description}"
@@ -104,7 +107,9 @@ def declare(node: Node, parameters: tuple[Parameter, ...]) -> dict[str, Any]:
     known = {parameter.name for parameter in parameters}
     for name in given:
         if name not in known and not node.has_parameter(name) and not name.startswith("qos_overrides."):
-            raise InputError(f"unknown parameter {name}; this node has {', '.join(sorted(known))}")
+            near = get_close_matches(name, known, n=1)
+            mend = f"did you mean {near[0]}?" if near else f"this node has {', '.join(sorted(known))}"
+            raise InputError(f"unknown parameter {name}; {mend}")
     values: dict[str, Any] = {}
     for parameter in parameters:
         value = parameter.default

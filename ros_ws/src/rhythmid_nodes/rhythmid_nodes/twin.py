@@ -37,6 +37,12 @@ from .qos import AdaptiveSubscription, latched, message_type
 
 _PERIOD = 0.1  # s between two reads of the queue
 _RELEASED = "command"  # topic of the commands that the last relay before the machine has released
+ENDED, LAST = "mismatches ended", "last mismatch"
+"""Keys of the events among the values of the model."""
+
+UNSTAMPED = "without stamps"
+"""What follows the topic in the key of a signal whose messages bear none."""
+
 _LATE_NS = 10_000_000  # a message that is older on arrival counts as late
 PARAMETERS = (
     TIME_MODE,
@@ -68,19 +74,19 @@ class _Ear:
         self.count = 0
         self.lateness = Lateness(_LATE_NS)
         self._rate = (time.monotonic(), 0, 0.0)
-        self._stamped = False
+        self.stamped: bool | None = None  # None before its type is known
         self._node, self._topic = node, topic
         self.subscription = AdaptiveSubscription(node, topic, node.while_active(self._receive), self._found)
 
     def _found(self, type_name: str, _publishers: Sequence[TopicEndpointInfo]) -> None:
         fields = message_type(type_name).get_fields_and_field_types()
-        self._stamped = next(iter(fields.values()), "") == "std_msgs/Header"
+        self.stamped = next(iter(fields.values()), "") == "std_msgs/Header"
         self._node.inbox.learn_type(self._topic, type_name)
 
     def _receive(self, data: bytes, received_ns: int) -> None:
         received_ns = received_ns or self._node.wall.now()
         self.count += 1
-        if self._stamped:
+        if self.stamped:
             self.lateness.add(max(0, received_ns - stamp_of(data)))
         self._node.inbox.put(self._topic, data, received_ns)
 
@@ -159,9 +165,12 @@ class TwinNode(GraphNode):
         found: dict[str, str] = {}
         for topic, ear in self._ears.items():
             found[f"{topic} rate [Hz]"] = f"{ear.rate():.1f}"
+            found[f"{topic} lost"] = str(ear.subscription.lost)
+            if ear.stamped is False:
+                found[f"{topic} {UNSTAMPED}"] = "its lateness cannot be seen"
+                continue
             for key, value in ear.lateness.summary(f"{topic} lateness").items():
                 found[key.replace("_mean_ms", " mean [ms]").replace("_p99_ms", " p99 [ms]").replace("_max_ms", " max [ms]")] = value  # fmt: skip
-            found[f"{topic} lost"] = str(ear.subscription.lost)
         twin = self._watch.twin
         return {**found, "samples refused": str(twin.refused), "outliers left out": str(twin.outliers)}
 
@@ -207,7 +216,7 @@ class TwinNode(GraphNode):
         if status.level == self._told[0] and now - self._told[1] < 1.0:
             return
         self._told = status.level, now
-        told = {key: f"{value:.6g}" for key, value in quantities(status).items()}
+        told = {key: f"{value:.6g}" for key, value in quantities(status).items()} | self._events()
         diagnostic = DiagnosticStatus(
             level=_LEVELS[status.level],
             name=status_name(f"{self.get_fully_qualified_name()}/model"),
@@ -218,6 +227,11 @@ class TwinNode(GraphNode):
         message = DiagnosticArray(status=[diagnostic])
         message.header.stamp = self.get_clock().now().to_msg()
         self._reports.publish(message)
+
+    def _events(self) -> dict[str, str]:
+        """The number of mismatches that have ended, and the last of them."""
+        ended = [event for event in self._watch.events.found if event.until is not None]
+        return {ENDED: str(len(ended)), LAST: ended[-1].sentence()} if ended else {}
 
     def _diagnosis(self) -> dict[str, str]:
         """Verdict and names of the diagnosis of the present mismatch; empty if there is none."""
@@ -235,6 +249,8 @@ class TwinNode(GraphNode):
         event = self._watch.events.current
         if event is None:
             return "the machine does what its model does"
+        if status.mismatch < 1.0:
+            return f"the machine does what its model does again; it has left it {event.sentence()}"
         return f"the machine has left its model {event.sentence()}"
 
     def _plot(self, status: Status) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .sample import Sample
@@ -19,10 +20,11 @@ class Limits:
     Attributes
     ----------
     stale_after : largest age [s] of the newest measurement, by its arrival and by its stamp; 0: any.
-    low, high : range of positions [m].
-    speed : largest |v| [m/s].
+    low, high : range of positions.
+    speed : largest |v| [1/s].
     frozen_after : time [s] for which the position may stay exactly the same; 0: any.
     gap : largest step [s] from one stamp to the next, forwards or backwards; 0: as `stale_after`.
+    unit : of positions, for messages.
     other_clock : whether the stamps come from another clock than this computer's. Their age is then relative to the smallest difference so far.
     """
 
@@ -33,6 +35,7 @@ class Limits:
     frozen_after: float = 0.0
     gap: float = 0.0
     other_clock: bool = False
+    unit: str = "m"
 
 
 class Watch:
@@ -41,7 +44,7 @@ class Watch:
 
     Attributes
     ----------
-    speed : of the newest measurement [m/s], from successive positions if the message does not contain it; NaN before the first one.
+    speed : of the newest measurement, from successive positions if the message does not contain it; NaN before the first one.
     """
 
     def __init__(self, limits: Limits, measured: str = "the machine") -> None:
@@ -51,6 +54,7 @@ class Watch:
             threading.Lock()
         )  # its own: a busy clock thread that holds another for long keeps no measurement waiting
         self._newest: Sample | None = None
+        self._others = ""  # joints that the messages name instead
         self._gap = 0.0
         self._arrived_ns = self._moved_ns = 0
         self._offset_ns = (
@@ -72,20 +76,25 @@ class Watch:
         self._offset_ns = min(self._offset_ns + drifted, arrived_ns - sample.stamp_ns)
         self._newest, self._arrived_ns = sample, arrived_ns
 
+    def hear_others(self, joints: Sequence[str]) -> None:
+        """Note which joints a message names that lacks the one."""
+        if self._newest is None:
+            self._others = f"; the messages there name {', '.join(joints) or 'no joint'}"
+
     def danger(self, now_ns: int) -> str:
         """Reason why the machine must not be excited now; empty if it may."""
         with self._lock:
             sample, stale = self._newest, self._limits.stale_after
             if sample is None:
-                return f"no measurement of {self._measured} yet" if stale > 0.0 else ""
+                return f"no measurement of {self._measured} yet{self._others}" if stale > 0.0 else ""
             return self._state(sample) or self._age(sample, now_ns)
 
     def _state(self, sample: Sample) -> str:
         limits = self._limits
         if not math.isfinite(sample.position) or not limits.low <= sample.position <= limits.high:
-            return f"the position {sample.position:g} m is outside the envelope [{limits.low:g}, {limits.high:g}] m"
+            return f"the position {sample.position:g} {limits.unit} is outside the envelope [{limits.low:g}, {limits.high:g}] {limits.unit}"
         if abs(self.speed) > limits.speed:
-            return f"the speed of {self.speed:g} m/s exceeds {limits.speed:g} m/s"
+            return f"the speed of {self.speed:g} {limits.unit}/s exceeds {limits.speed:g} {limits.unit}/s"
         return ""
 
     def _age(self, sample: Sample, now_ns: int) -> str:
@@ -107,7 +116,7 @@ class Watch:
             )
         still = (self._arrived_ns - self._moved_ns) * 1e-9
         if still > limits.frozen_after > 0.0:
-            return f"the position has been exactly {sample.position:g} m for {still:.3f} s, allowed are {limits.frozen_after:g} s"
+            return f"the position has been exactly {sample.position:g} {limits.unit} for {still:.3f} s, allowed are {limits.frozen_after:g} s"
         return ""
 
 
