@@ -1,4 +1,5 @@
-"""Permission to command: one publisher per topic. A second publisher is named and counted, and its messages are ignored."""
+"""Permission to command: one node per topic. A second publisher is named and counted, and its messages are ignored. Another node that
+publishes when the first has gone, as a second one does that was found late, is one too many as well; the same node may come back."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ UNNAMED = "unnamed node"
 
 class Authority:
     """Monitors the publishers of `topic`. `intrusion(reason)` is called when a second publisher appears, and again when its node's
-    name is known.
+    name is known; and when another node has taken the place of the one whose messages were admitted.
 
     Attributes
     ----------
@@ -31,6 +32,7 @@ class Authority:
         self.topic = node.resolve_topic_name(topic)
         self._node, self._intrusion = node, intrusion
         self._sequence = SequenceCheck()
+        self._accepted = ""  # full name of the node whose messages are admitted, once it is known
         self._told = ""  # the present conflict
         self._publishers = ""  # the newest conflict so far
         self._timer = node.create_timer(_LOOK_PERIOD, self._look)
@@ -60,11 +62,22 @@ class Authority:
         names = sorted(map(_name, found))
         return f"{len(names)} publishers of {self.topic}: {', '.join(names)}" if len(names) > 1 else ""
 
+    def _successor(self) -> str:
+        """Which node publishes in the place of the accepted one; empty where none does."""
+        found = self._node.get_publishers_info_by_topic(self.topic) if self._sequence.begun else []
+        name = _name(found[0]) if len(found) == 1 else UNNAMED
+        if name.startswith(UNNAMED):
+            return ""
+        self._accepted = self._accepted or name
+        return (
+            "" if name == self._accepted else f"{name} publishes on {self.topic} in place of {self._accepted}"
+        )
+
     def _count(self) -> int:
         return self._node.count_publishers(self.topic)
 
     def _look(self) -> None:
-        conflict = self.conflict()
+        conflict = self.conflict() or self._successor()
         if conflict and conflict != self._told:
             self._publishers = conflict
             if not self._told or UNNAMED in self._told:

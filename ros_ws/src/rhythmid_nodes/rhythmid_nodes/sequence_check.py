@@ -15,6 +15,11 @@ class SequenceCheck:
         self.foreign = 0
         self._last: int | None = None
 
+    @property
+    def begun(self) -> bool:
+        """Whether a message was admitted."""
+        return self._last is not None
+
     def admits(self, number: int, publishers: Callable[[], int]) -> bool:
         """Whether the message with that number continues the sequence.
 
