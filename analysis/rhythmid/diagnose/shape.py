@@ -18,7 +18,6 @@ from rhythmid.diagnose.search.score_tests import Trajectories
 from rhythmid.diagnose.static_law import INSTANTS, SAME, curved
 from rhythmid.elements.element import Element, Scales
 from rhythmid.elements.first_guess import NoGuess
-from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.model import Model, Term
 from rhythmid.simulation.effect import Path, effect_along
 
@@ -76,18 +75,6 @@ def within_bounds(term: Term, sizes: Scales) -> float:
         ends = [end for end in term.values[name].bounds if math.isfinite(end) and end != 0.0]
         least = min([least, *(abs(value - end) / abs(end) for end in ends)])
     return least
-
-
-def from_ends(model: Model, added: Sequence[str], balance: Balance, sizes: Scales) -> float:
-    """Smallest distance of the `added` effects from the ends of their ranges, as a share; infinite where there is none.
-
-    For a freed mass or inertia of a link it is the share of the given one that is left: a link without mass is no link, so that another effect has
-    taken it.
-    """
-    given = {name: balance.motions[0].links[name][0] for name in added if name in balance.motions[0].links}
-    left = [model.value(name) / value for name, value in given.items() if value > 0.0]
-    terms = [term for label in added if (term := model.term(label)) is not None]
-    return min([*left, *(within_bounds(term, sizes) for term in terms)], default=math.inf)
 
 
 def _size(term: Term, sizes: Scales) -> float:

@@ -34,7 +34,7 @@ from rhythmid.diagnose.effort.scales import scales_at, scales_of
 from rhythmid.diagnose.evidence import Blocks, predict
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, special_case
 from rhythmid.diagnose.rejections import AT_END, SHAPES, Claim, keeps_shape, rejections_of, replaces
-from rhythmid.diagnose.shape import from_ends
+from rhythmid.diagnose.shape import within_bounds
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -386,7 +386,9 @@ class _Search:
         fit = fit_effort(self.balance, model, [n for n in model.free if n in priors], priors, aligned, at)
         made = Fitted.of(elements, kind_of(elements, model), fit, priors, self.balance)
         sizes = scales_of(self.balance, model)
-        return replace(made, shape={"within_bounds": from_ends(fit.model, elements, self.balance, sizes)})
+        terms = [term for label in elements if (term := fit.model.term(label)) is not None]
+        ends = [within_bounds(term, sizes) for term in terms]
+        return replace(made, shape={"within_bounds": min(ends, default=math.inf)})
 
     def _aligned(self, elements: Sequence[str]) -> Alignment:
         if INPUT_DELAY not in elements:
