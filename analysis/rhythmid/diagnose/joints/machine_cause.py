@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 from rhythmid.diagnose.constants import HOLDS, PRACTICAL_EFFORT
 from rhythmid.diagnose.joints.joint_case import PROMISING, JointResult
 from rhythmid.diagnose.joints.link_evidence import gain_of, parts_of, with_body_of
-from rhythmid.diagnose.joints.payload_place import ROUNDS, in_units_of_noise
+from rhythmid.diagnose.joints.payload_place import in_units_of_noise
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, fit_effort, variation_of
@@ -26,6 +26,9 @@ from rhythmid.model import Model
 Array = NDArray[np.float64]
 Columns = dict[str, list[Array]]  # by joint and motion, changes (n, p) of the effort
 WeightedRows = tuple[Array, Array]  # residual (n,) and columns (n, p) of a joint, in units of its noise
+# most fits of paths and numbers in turn, and the change of each number, in its standard deviations, from which they have settled. A tilt
+# settles in three; the compliance of a gear moves all paths, and took ten (three left it six standard deviations off)
+MOST_ROUNDS, SETTLED = 12, 0.2
 TURNS = 20  # most changes between the best cause and the best hypotheses beside it; three settle it
 
 
@@ -94,9 +97,9 @@ def worth_it(
         return None
     options = {joint: _options(one, columns[joint]) for joint, one in weighing.items()}
     given = {joint: balances.models[joint] for joint in found}
-    made = []
+    numbers, made = np.zeros(len(cause.spreads)), []
     for paths in (given, {**given, **_best_beside(options, cause)}):
-        numbers, covariance, fitted = _fitted(cause, balances, found, paths, list(weighing))
+        numbers, covariance, fitted = _fitted(cause, balances, found, paths, list(weighing), numbers)
         after = cause.in_place(numbers, fitted)
         made.append(_weighed(Weighed(numbers, covariance, fitted, 0.0, ""), balances, after, found, weighing))
     plain, richer = made
@@ -210,14 +213,17 @@ def _best_beside(options: Mapping[str, list[_Option]], cause: Cause) -> dict[str
 
 def _fitted(
     cause: Cause, balances: JointBalances, found: Mapping[str, JointResult], paths: Mapping[str, Model], judges: Sequence[str],
+    start: Array,
 ) -> tuple[Array, Array, dict[str, Model]]:  # fmt: skip
-    """The numbers that fit best beside these paths, their covariance, and the fitted paths; paths and numbers are fitted in turn."""
-    numbers, covariance = np.zeros(len(cause.spreads)), np.eye(len(cause.spreads))
+    """The numbers that fit best beside these paths, their covariance, and the fitted paths; paths and numbers are fitted in turn, from a
+    `start` (k,) of the numbers, until they settle."""
+    numbers, covariance = start, np.diag(cause.spreads**2)
     fitted = {
         joint: one.result.nominal.fit.model if paths[joint] is balances.models[joint] else paths[joint]
         for joint, one in found.items()
     }
-    for _ in range(ROUNDS):
+    for _ in range(MOST_ROUNDS):
+        before = numbers
         now = cause.imposed(numbers, fitted)
         fits = {
             joint: fit_effort(
@@ -230,7 +236,9 @@ def _fitted(
         weighted = [
             rows_of(now.balance(joint, found[joint].late), fits[joint], columns[joint]) for joint in judges
         ]
-        numbers, covariance = _refined(weighted, cause, numbers)
+        numbers, covariance = _refined(weighted, cause, before)
+        if np.all(np.abs(numbers - before) <= SETTLED * np.sqrt(np.diag(covariance))):
+            break
     return numbers, covariance, fitted
 
 
