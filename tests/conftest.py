@@ -23,6 +23,7 @@ settings.load_profile("rhythmid")
 
 LONGEST = (  # files that take more than about twenty seconds of the processor
     "ros/test_run.py", "ros/test_foreign_robot.py", "ros/test_tour.py", "ros/test_testing.py", "ros/test_realtime_delays.py",
+    "ros/test_lockstep_run.py",
     "ros/test_workspace.py",
     "unit/test_effort_search.py", "unit/test_element_recorded.py", "faults/test_bad_input.py", "proof/test_concealed.py",
     "unit/test_plausibility.py", "faults/test_diagnose_bad_input.py", "unit/test_twin_diagnosis.py", "unit/test_tick_interval.py",

@@ -5,19 +5,13 @@ from __future__ import annotations
 import math
 
 from .command import STAMPED, TYPES
-from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW
+from .node import SAMPLED
 from .parameters import Parameter
 from .watch_parameters import PARAMETERS as WATCHED
 
 _FAR = math.inf
 PARAMETERS = (
-    RATE,
-    TIME_MODE,
-    JOINT,
-    WINDOW,
-    COUNT,
-    PRIORITY,
-    CATCH_UP,
+    *SAMPLED,
     Parameter("excitation", "", "what to play, in JSON: the `excitation` of an experiment file"),
     Parameter("folder", ".", "where file names in it start"),
     Parameter("max_effort", 0.0, "largest |u|; what exceeds it is clamped", "N", (0.0, _FAR)),

@@ -62,6 +62,9 @@ CATCH_UP = Parameter(
 )
 """By default as long as a command is held: after a longer overrun the robot has been given up already."""
 
+SAMPLED = (RATE, TIME_MODE, JOINT, WINDOW, COUNT, PRIORITY, CATCH_UP)
+"""Of a node that sends or takes one message of a joint for each sample of a run."""
+
 AUTOSTART = Parameter("autostart", True, "configures and activates itself; else ~/change_state does")
 _NO_SIM_TIME = "parameter use_sim_time = True: the nodes take no time from /clock; for simulated time use time_mode = 'lockstep'"
 

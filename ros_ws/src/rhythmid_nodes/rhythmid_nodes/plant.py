@@ -24,19 +24,13 @@ from .effort_limits import EffortLimits
 from .joint_state import JointStateReader, JointStateWriter
 from .lateness import Lateness
 from .lockstep import Acknowledger, Credit, block
-from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, lapse_notice, run
+from .node import SAMPLED, GraphNode, lapse_notice, run
 from .parameters import Parameter
 from .qos import stream, subscribe_informed
 
 _LARGE = 1e12
 PARAMETERS = (
-    RATE,
-    TIME_MODE,
-    JOINT,
-    WINDOW,
-    COUNT,
-    PRIORITY,
-    CATCH_UP,
+    *SAMPLED,
     Parameter("max_effort", math.inf, "largest |effort| of a command; what exceeds it is clamped", "N", (0.0, math.inf)),
     Parameter("max_effort_rate", math.inf, "realtime: largest change of the effort", "N/s", (0.0, math.inf)),
     Parameter("max_power", math.inf, "realtime: largest |effort times speed of the plant|", "W", (0.0, math.inf)),
