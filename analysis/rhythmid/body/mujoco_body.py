@@ -4,8 +4,7 @@ E. Todorov, T. Erez, Y. Tassa, MuJoCo: a physics engine for model-based control,
 """
 
 import copy
-import hashlib
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,6 +17,7 @@ from rhythmid.body.body import Array, Body, Joint, Passive
 from rhythmid.body.compiled_joints import joints_of, passive_of
 from rhythmid.body.inertial_parameter import ARMATURE, MASS, PAYLOAD, TURNING, split
 from rhythmid.body.link_inertia import Hinge, Principal, end_links, hinges, point_mass
+from rhythmid.body.remembered import Remembered
 from rhythmid.body.robot_file import (
     FIXED,
     FREE,
@@ -30,7 +30,6 @@ from rhythmid.body.robot_file import (
 )
 from rhythmid.errors import InputError
 
-MEMORY = 1e8  # bytes of forces of single links that are kept
 HEAVIEST = 1e6  # [kg] a larger mass of a link is a mistake
 AS_THE_LINK = np.array([1.0, 0.0, 0.0, 0.0])  # axes aligned with the link's frame
 WEIGHTLESS = 1e-10  # [kg] if all links together weigh less, they have no mass other than `LEAST_MASS`
@@ -58,7 +57,7 @@ class MujocoBody(Body):
         default_factory=dict
     )  # for links whose inertia is not the file's, the ten numbers (10,) without a payload
     mounted: bool = False  # whether gravity differs from the file's
-    _alone: dict[Hashable, Array] = field(default_factory=dict, repr=False)  # forces of single links
+    _alone: Remembered = field(default_factory=Remembered, repr=False)  # forces of single links
 
     @classmethod
     def load(
@@ -131,7 +130,7 @@ class MujocoBody(Body):
         """A copy with another acceleration of gravity (3,) [m/s^2] in the frame of the file's world, as of a base that hangs or is on a wall."""
         model = copy.copy(self.model)
         model.opt.gravity[:] = gravity
-        return replace(self, model=model, mounted=True, _alone={})
+        return replace(self, model=model, mounted=True, _alone=Remembered())
 
     def worker(self) -> tuple[Any, Any]:
         """A model and the data of a run, for use in one thread."""
@@ -162,18 +161,6 @@ class MujocoBody(Body):
                 return str(self.model.joint(first + count - 1).name)
             number = int(self.model.body_parentid[number])
         raise InputError(f"{self.path}: the link {link!r} does not move")
-
-    def carries_all(self, joint: str) -> bool:
-        """Whether a joint moves all other joints, as that of a base does."""
-        own = int(self.model.jnt_bodyid[self.model.joint(joint).id])
-        first = int(self.model.body_jntadr[own])
-        if self.model.joint(first).name != joint:
-            return False
-        within = {own}
-        for body in range(own + 1, self.model.nbody):  # a body comes after the one that carries it
-            if int(self.model.body_parentid[body]) in within:
-                within.add(body)
-        return all(int(one) in within for one in self.model.jnt_bodyid)
 
     @cached_property
     def hinges(self) -> dict[str, Hinge]:
@@ -323,23 +310,17 @@ class MujocoBody(Body):
 
         They do not depend on the inertia that the link has in this body, so that bodies with other inertias share what is known.
         """
-        of = hashlib.blake2b(digest_size=16)
-        for one in (inertia.moments, inertia.centre, inertia.turn, *motion):
-            of.update(np.ascontiguousarray(one, dtype=float).data)
-        key = (link, inertia.mass, len(motion[0]), of.digest())
-        if (known := self._alone.get(key)) is not None:
-            return known
+        numbers = (inertia.moments, inertia.centre, inertia.turn, *motion)
+        name = link, inertia.mass, len(motion[0])
+        return self._alone.of(name, numbers, lambda: self._forces_of_one(link, inertia, motion))
+
+    def _forces_of_one(self, link: int, inertia: Principal, motion: tuple[Array, Array, Array]) -> Array:
         model, data = self.worker()
         for one in (model.body_mass, model.body_inertia, model.jnt_stiffness, model.dof_damping):
             one[:] = 0.0
         model.dof_armature[:] = 1.0  # MuJoCo always factorises the inertia matrix
         inertia.put_into(model, link)
-        made = self._along(model, data, *motion) - motion[2]
-        made.flags.writeable = False  # it is returned again
-        if (len(self._alone) + 1) * made.nbytes > MEMORY:
-            self._alone.clear()
-        self._alone[key] = made
-        return made
+        return self._along(model, data, *motion) - motion[2]
 
     def inertial_columns(self, link: str, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Columns (n, nv, 10) of a link's mass, mass times position of the centre (3), and inertia about the link's

@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 
+from rhythmid.body.carrier import carries_all
 from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Recorded
@@ -45,7 +46,7 @@ def base_of(
     found = (
         {joint: known[name] for joint, name in joints_of(joints, list(known), True).items()} if known else {}
     )
-    bases = [joint for joint in found if robot.carries_all(joint)]
+    bases = [joint for joint in found if carries_all(robot.model, joint)]
     if len(bases) == 1:
         return bases[0], found[bases[0]]
     if idle:

@@ -74,8 +74,7 @@ class Balance:
     period: float
     _forces: dict[Hashable, Array] = field(default_factory=dict, repr=False)
     _sensitive: dict[str, bool] = field(default_factory=dict, repr=False)
-    # of this balance alone: a copy with other values has none
-    fits: dict[Hashable, Any] = field(init=False, default_factory=dict, repr=False)
+    fits: dict[Hashable, Any] = field(init=False, default_factory=dict, repr=False)  # a copy has none
 
     @classmethod
     def of(cls, records: Sequence[Record], model: Model, bandwidth: Bandwidth | None = None) -> "Balance":
