@@ -4,11 +4,11 @@ Coulomb friction, Stribeck friction and hysteresis are laws of one family. Sever
 leave a small mismatch that the true law would not. Then each name is uncertain, but the family is not.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rhythmid.diagnose.hypothesis import Hypothesis
-from rhythmid.diagnose.probability import chance_of_law, removed_by
+from rhythmid.diagnose.probability import chance_beside, chance_of_law
 from rhythmid.diagnose.selection import Contest
 
 LISTED = 0.01  # weight from which a law is listed: about the accuracy of a weight by the Bayesian bootstrap, see `DRAWS`
@@ -38,7 +38,7 @@ def families_of(
     shares: Mapping[str, float],
     weights: Mapping[tuple[str, ...], float],
     left: float,
-    open_: Collection[str],
+    in_place: Mapping[str, tuple[float, float]],
     size_errors: Mapping[str, float],
 ) -> tuple[MissingFamily, ...]:
     """Families of the chosen hypothesis' effects, the one with the largest share first.
@@ -49,8 +49,8 @@ def families_of(
     shares : shares of the mismatch that the effects explain, by label.
     weights : weights of the hypotheses, by key.
     left : share of the mismatch that the chosen hypothesis is expected to leave.
-    open_ : labels of its effects that are probably not the true laws. The mismatch that those of another family explain may
-        be due to this family.
+    in_place : for each of its effects the chance that it stands in the place of an unknown law, and the share of the mismatch
+        that it removes. What an effect of another family removes may be due to this family.
     size_errors : relative standard deviations of the effects' sizes, by label. For a family that of its effect with the largest
         share counts: an effect at a limit of its law may also be a law of another family.
     """
@@ -61,14 +61,21 @@ def families_of(
     found = []
     for family, mine in labels.items():
         share = min(sum(shares[label] for label in mine), 1.0)
-        others = [label for label in open_ if label not in mine]
+        others = [one for label, one in in_place.items() if label not in mine]
         laws, held = _laws(contest, family, weights)
         vague = size_errors.get(max(mine, key=lambda label: shares[label]), 0.0)
-        chance = chance_of_law(share, left + removed_by(others, chosen, contest), vague, family) * held
+
+        def chance(rest: float, family: str = family, share: float = share, vague: float = vague) -> float:
+            return chance_of_law(share, rest, vague, family)
+
         own = [
             name for name in chosen.names if chosen.family.get(name) == family
         ]  # laws that predict as well as those with more weight
-        found.append(MissingFamily(family, tuple(dict.fromkeys((*laws, *own))), share, chance))
+        found.append(
+            MissingFamily(
+                family, tuple(dict.fromkeys((*laws, *own))), share, chance_beside(others, chance, left) * held
+            )
+        )
     return tuple(sorted(found, key=lambda one: -one.share))
 
 

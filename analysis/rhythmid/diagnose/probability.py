@@ -7,7 +7,7 @@ an effect that improves the prediction whatever its size does so at a limit of i
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -90,13 +90,37 @@ def chance_of_law(share: float, left: float, size_error: float = 0.0, family: st
     return odds * chance / (1.0 - chance + odds * chance)
 
 
-def removed_by(some: Sequence[str], chosen: Hypothesis, contest: Contest) -> float:
-    """Share of the mismatch that some effects of a hypothesis remove beside its others; 0 where the model without them was not fitted.
+def doubt(chance: float, family: str) -> float:
+    """Chance that an effect stands in the place of an unknown law, as far as its share or the deviation of its size tell.
 
-    Laws that are unlikely to be true remove a part that belongs to an unknown law.
+    That the catalogue may lack a law although it explains everything does not count here: it puts no other law in doubt.
     """
+    return 1.0 - chance / chance_of_law(1.0, 0.0, 0.0, family)
+
+
+def chance_beside(
+    others: Sequence[tuple[float, float]], chance: Callable[[float], float], left: float
+) -> float:
+    """Chance that an effect is the law that its name says, where others beside it may stand in the place of unknown laws.
+
+    Parameters
+    ----------
+    others : doubt about each other effect, and the share of the mismatch that it removes. With that chance the share is left.
+    chance : the chance as a function of the share that is left.
+    left : the share that is left where all other effects are true laws.
+    """
+    if not others:
+        return chance(left)
+    (doubted, share), *rest = others
+    return (1.0 - doubted) * chance_beside(rest, chance, left) + doubted * chance_beside(
+        rest, chance, left + share
+    )
+
+
+def removed_by(label: str, chosen: Hypothesis, contest: Contest) -> float:
+    """Share of the mismatch that an effect of a hypothesis removes beside its others; 0 where the model without it was not fitted."""
     whole = contest.mismatch
-    others = set(chosen.elements) - set(some)
+    others = set(chosen.elements) - {label}
     without = [one.prediction.mean_square for one in contest.hypotheses if set(one.elements) == others]
     if whole <= 0.0 or not without:
         return 0.0

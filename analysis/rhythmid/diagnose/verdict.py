@@ -11,7 +11,9 @@ from rhythmid.diagnose.evidence import chance_better, difference, gain_ahead, re
 from rhythmid.diagnose.family import MissingFamily, families_of
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, Verdict
 from rhythmid.diagnose.probability import (
+    chance_beside,
     chance_of_law,
+    doubt,
     joint_probability,
     removed_by,
     weights_of,
@@ -228,13 +230,16 @@ def decide(
         label: chance_of_law(shares[label], lost, size_errors.get(label, 0.0), family[label])
         for label in labels
     }
-    open_ = [label for label in labels if alone[label] < STATED]
+    in_place = {
+        label: (doubt(alone[label], family[label]), removed_by(label, chosen, contest)) for label in labels
+    }
     sure = {
-        label: chance_of_law(
-            shares[label],
-            lost + removed_by([one for one in open_ if names[one] != names[label]], chosen, contest),
-            size_errors.get(label, 0.0),
-            family[label],
+        label: chance_beside(
+            [in_place[one] for one in labels if names[one] != names[label]],
+            lambda rest, label=label: chance_of_law(
+                shares[label], rest, size_errors.get(label, 0.0), family[label]
+            ),
+            lost,
         )
         for label in labels
     }
@@ -287,7 +292,9 @@ def decide(
         tuple(group for group in groups if group[0] in told),
         left,
         tuple(names[label] for label in labels if label not in named and label in chosen.effects),
-        families_of(contest, chosen, shares, weights, lost, open_, size_errors) if rule.tells_family else (),
+        families_of(contest, chosen, shares, weights, lost, in_place, size_errors)
+        if rule.tells_family
+        else (),
         tuple(
             label
             for label in labels
