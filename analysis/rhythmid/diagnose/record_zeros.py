@@ -8,26 +8,19 @@ machine that has changed from record to record. The output is linear in its zero
 cross-validation is exact in them. Beside the effect, both are fitted together.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rhythmid.diagnose.baseline import Calibration
-from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
-from rhythmid.diagnose.contenders import Rows, linearised, rows_of
-from rhythmid.diagnose.evidence import Linearised, predict, weight_for
+from rhythmid.diagnose.calibration_evidence import Seen
+from rhythmid.diagnose.constants import FOLLOWS
 from rhythmid.diagnose.free_functions import FreeFunction
-from rhythmid.diagnose.location import Reach, beside, following, reach_of
-from rhythmid.diagnose.rejections import decisive
 from rhythmid.diagnose.search.forward import search
-from rhythmid.diagnose.search.score_tests import under
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
-from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate, rerun
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.record_zero import moved, others_marked, with_record_zero
@@ -36,66 +29,15 @@ from rhythmid.identify.zero_estimates import zeros_of
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 
-Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class _Seen:
-    """A fit under white noise, with the data for its predictions."""
-
-    fit: Fit
-    rows: Rows
-    reach: Sequence[Reach]
-    base: Linearised
-
-    @classmethod
-    def of(cls, fit: Fit, pool: ThreadPoolExecutor | None) -> "_Seen":
-        """Assume white noise: the missing part is not noise, and whitening it would remove most of a constant."""
-        left = np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series, strict=True)])
-        noise = NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
-        fit = under(fit, noise, pool)
-        rows = rows_of(fit.run.series, (), noise)
-        reach = reach_of(fit, rows, pool)
-        return cls(fit, rows, reach, following(linearised(fit, rows), rows, reach))
-
-    def with_zeros(self) -> Linearised:
-        """The linearised fit with a zero of each record but the first."""
-        series = self.fit.run.series
-        names = tuple(dict.fromkeys(record_of(one) for one in series))[1:]
-        columns = tuple(
-            tuple(np.full(one.blocks, float(record_of(one) == name)) for one in series) for name in names
-        )
-        return beside(self.fit, self.base, FreeFunction("zero", columns), self.rows, self.reach)
-
-    def refitted(self, pool: ThreadPoolExecutor | None) -> Linearised | None:
-        """The fit with a zero of each record, all parameters refitted; None where that fails.
-
-        The refit is needed because an effect fitted without the zeros is far from its best values with them.
-        """
-        try:
-            free = estimate(
-                with_record_zero(self.fit.model),
-                others_marked(self.fit.run.series),
-                noise=self.rows.noise,
-                pool=pool,
-            )
-            return following(linearised(free, self.rows), self.rows, reach_of(free, self.rows, pool))
-        except InputError:
-            return None
-
-
-def _told(seen: _Seen, with_zeros: Linearised | None, most: float = math.inf) -> bool:
-    """Whether zeros predict unseen data decisively better than the fit alone.
-
-    The gain must have a practical size, and the error with the zeros must be at most `most`, as a share of the motion.
-    """
-    if with_zeros is None:
-        return False
-    found = predict([with_zeros, seen.base], seen.rows.blocks, seen.rows.record)
-    size = seen.rows.size / seen.rows.noise.std  # converted to units of the noise, as the errors
-    removed = found[1].mean_square - found[0].mean_square
-    decided = weight_for(found[0], found[1]) > decisive(1) and removed > (PRACTICAL * size) ** 2
-    return decided and found[0].mean_square < (most * size) ** 2
+def _zero_of_each(fit: Fit) -> FreeFunction:
+    """A constant of each record but the first."""
+    series = fit.run.series
+    names = tuple(dict.fromkeys(record_of(one) for one in series))[1:]
+    columns = tuple(
+        tuple(np.full(one.blocks, float(record_of(one) == name)) for one in series) for name in names
+    )
+    return FreeFunction("zero", columns)
 
 
 def with_zeros(
@@ -114,13 +56,14 @@ def with_zeros(
     fit, series, kept = calibration.fit, calibration.series, (calibration, list(unseen))
     if len({record_of(one) for one in series}) < 2 or series[0].measured != "position":
         return kept
-    alone = _Seen.of(fit, pool)
-    if not _told(alone, alone.with_zeros()):
+    alone = Seen.of(fit, pool)
+    if not alone.needs(alone.extended(_zero_of_each(alone.fit)), alone.base):
         return kept
     tell("the output's zero seems to differ from record to record; looking for an effect that says the same")
     known = catalogue.within(scales(series, fit.model))
-    explained = _Seen.of(search(series, fit, given, known, pool, tell, most=1).fit, pool)
-    if not _told(explained, explained.refitted(pool), FOLLOWS):
+    explained = Seen.of(search(series, fit, given, known, pool, tell, most=1).fit, pool)
+    both = explained.refitted(with_record_zero(explained.fit.model), others_marked(series), pool)
+    if not explained.needs(both, explained.base, FOLLOWS):
         return kept
     tell("refitting with a zero of each record")
     try:

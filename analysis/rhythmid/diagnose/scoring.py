@@ -17,6 +17,7 @@ from rhythmid.diagnose.baseline import Calibration, calibrate, reconstructed
 from rhythmid.diagnose.constants import BETTER_STEP, BETTER_TOGETHER, FOLLOWS, HOPELESS, PATIENCE
 from rhythmid.diagnose.hypothesis import ScoringKind
 from rhythmid.diagnose.record_zeros import with_zeros
+from rhythmid.diagnose.reference_scale import with_reference_scale
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import LEAST_BLOCKS, forgets, periods_long
@@ -150,6 +151,7 @@ def _scored(
     if not separate:
         cut, unseen = hold_out_tail(cut)
     calibration = calibrate(model, cut, catalogue, pool, tell)
+    calibration = with_reference_scale(calibration, model, catalogue, pool, tell)
     if how.kind == "free_run":  # the initial states of windows would absorb most of a zero
         calibration, unseen = with_zeros(calibration, model, unseen, catalogue, pool, tell)
     if calibration.reconstructed:

@@ -200,6 +200,19 @@ def sufficient(
     return run
 
 
+def integrable(run: FreeRun, model: Model, starts: Sequence[Array], halvings: int = 6) -> FreeRun:
+    """The run with its step halved, at most `halvings` times, until the model's outputs are finite; as it is where they never are.
+
+    A controller or a spring that is fast for the step makes an explicit method diverge, although the model does not.
+    """
+    finer = run
+    for _ in range(halvings + 1):
+        if finer.outputs(model, starts) is not None:
+            return finer
+        finer = halved(finer)
+    return run
+
+
 def coarser(run: FreeRun, factor: float) -> FreeRun:
     """The run with steps longer by a factor. Blocks and the command's knots still end steps."""
     return replace(run, max_step=max(run.max_step, min(factor * run.max_step, run.longest_step)))

@@ -12,7 +12,7 @@ from rhythmid.deadline import without_deadline
 from rhythmid.errors import InputError
 from rhythmid.identify.covariance import covariance_of, on_the_edge
 from rhythmid.identify.descent import WHITE, Descent, descend, first_guess
-from rhythmid.identify.free_run import FreeRun, halved, prepare_run, sufficient
+from rhythmid.identify.free_run import FreeRun, halved, integrable, prepare_run, sufficient
 from rhythmid.identify.ill_conditioned import ill_conditioned, with_ill_conditioned_directions
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.sensitivity import Linearisation, Problem
@@ -216,6 +216,8 @@ def estimate(
     chosen = tuple(model.free if names is None else names)
     run = prepare_run(model, series, max_step)
     guess = list(starts) if starts is not None else first_guess(model, run)
+    if max_step is None:
+        run = integrable(run, model, guess)
     if noise is not None:
         return minimise(model, run, chosen, noise, guess, iterations, pool)
     spread = max(float(np.std(one.averaged)) for one in series)

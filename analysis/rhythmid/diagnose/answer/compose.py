@@ -35,6 +35,7 @@ from rhythmid.diagnose.case import EXPLAINED, Case
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
+from rhythmid.diagnose.reference_scale import scale_told
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
@@ -144,6 +145,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         calibration=(
             *result.calibration.notes,
             *zeros_told(fit),
+            *scale_told(case.nominal, fit),
             *recalibrated(case.nominal, fit.model, {name: fit.std[name] for name in fit.names}),
             *_delay_told(case.nominal, fit),
         ),
