@@ -189,6 +189,7 @@ def tried(
     monkeypatch.setattr(scoring, "calibrate", calibrated)
     monkeypatch.setattr(Scoring, "error", property(lambda made: made.calibration.fit.error))
     monkeypatch.setattr(scoring, "hold_out_tail", lambda cut: (cut, ()))
+    monkeypatch.setattr(scoring, "with_reference_scale", lambda calibration, *_: calibration)
     monkeypatch.setattr(
         scoring, "with_zeros", lambda calibration, _, unseen, *__: (calibration, list(unseen))
     )
