@@ -19,7 +19,6 @@ from rhythmid.diagnose.answer.result import (
     MissingEffect,
     Remainder,
     Scored,
-    Untried,
     settled,
 )
 from rhythmid.diagnose.answer.untold import without_untold
@@ -101,11 +100,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     needed = decision.verdict != "consistent" and not settles
     heldout = {one.key: one.heldout_nrmse for one in contest.hypotheses}
     alternatives = tuple(
-        Alternative(
-            tuple(t.element(label).name for label in t.added),
-            t.bic() - best.bic(),
-            heldout.get(t.key),
-        )
+        Alternative(t.names, t.bic() - best.bic(), heldout.get(t.key))
         for t in [t for t in found.trials if t.key != best.key][:SHOWN]
     )
     part = "record" if result.scoring.kind == "free_run" else "window"
@@ -147,7 +142,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
             *recalibrated(case.nominal, fit.model, {name: fit.std[name] for name in fit.names}),
             *_delay_told(case.nominal, fit),
         ),
-        excluded=tuple(Untried(" + ".join(added), why) for added, why in found.excluded),
+        excluded=found.excluded,
         heldout=held_out_words(case.holdout, f"the last fifth of every {part}"),
         notes=(
             *notes,

@@ -11,7 +11,6 @@ from rhythmid.diagnose.answer.result import (
     FitQuality,
     Location,
     Scored,
-    Untried,
     settled,
 )
 from rhythmid.diagnose.answer.untold import without_untold
@@ -24,7 +23,7 @@ from rhythmid.diagnose.answer.wording import (
     recalibrated,
     summary_of,
 )
-from rhythmid.diagnose.case import Case
+from rhythmid.diagnose.case import Case, Untried
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.found_delay import delay_told, found_delay
 from rhythmid.diagnose.effort.run import EffortResult

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.deadline import SPENT, time_is_up
+from rhythmid.diagnose.case import Untried
 from rhythmid.diagnose.search.trial import (
     FAINTER,
     Origin,
@@ -266,7 +267,7 @@ def run_trials(
     enough: Sequence[float] | None = None,
     reach: float = math.inf,
     tell: Tell = silent,
-) -> tuple[list[Trial], list[tuple[tuple[str, ...], str]]]:
+) -> tuple[list[Trial], list[Untried]]:
     """Fit all proposals in parallel, beginning from the `origin`.
 
     First a few iterations from each guess, until chi2 is below `enough`. The promising trials are then fitted to convergence, as
@@ -280,11 +281,11 @@ def run_trials(
         return _fit_proposal(case[0], series, origin, noise, max_step, case[1], reach)
 
     trials: list[Trial] = []
-    excluded: list[tuple[tuple[str, ...], str]] = []
+    excluded: list[Untried] = []
     done = fork_map(one, list(zip(proposals, goals)))
     for index, result in counted(done, len(proposals), "fits", tell):
         if isinstance(result, Exception):
-            excluded.append((proposals[index].added, str(result)))
+            excluded.append(Untried(" + ".join(proposals[index].added), str(result)))
         else:
             trials.append(trial_of(proposals[index].added, proposals[index].model, result, noise))
     if not trials or time_is_up():
