@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.alternatives import alternatives
 from rhythmid.diagnose.baseline import Calibration
-from rhythmid.diagnose.case import EXPLAINED, SEARCHED, WEIGHED, Case, Untried
+from rhythmid.diagnose.case import EXPLAINED, WEIGHED, Case, Untried
 from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.contenders import (
     Contender,
@@ -123,14 +123,14 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     if selection.chosen.key != trial.key:
         trial = _trial_of(selection.chosen, contenders)
         run = weighing.run_of(trial)
-        if not weighing.late(AGAIN):
+        if not weighing.passed(AGAIN):
             after = dependences(run, weighing.rows, case.pool)
             contest = replace(contest, maps=weighing.maps(after, refitted, contenders))
             selection = select(contest)
             trial = _trial_of(selection.chosen, contenders)
     least = weighing.detectable(contenders, selection.chosen)
     found, errors = weighing.settled(trial, contest, selection)
-    shown = () if unseen and weighing.late(RERUN) else unseen
+    shown = () if unseen and weighing.passed(RERUN) else unseen
     if shown:
         case.tell("running both models over the held-out records")
     nominal_there, chosen_there = (
@@ -178,12 +178,15 @@ class _Weighing:
         """The chi2 that a model needs in order to compete."""
         return reach_of(self.found.fit.chi2, self.found.fit.samples)
 
-    def late(self, step: str, share: float = EXPLAINED) -> bool:
-        """Whether this share of the budget has passed; the `step` then counts as untried."""
-        passed = self.case.budget.passed(share)
-        if passed:
+    def skips(self, step: str, skip: bool) -> bool:
+        """Whether to skip a step for lack of time; it then counts as untried."""
+        if skip:
             self.untried.append(Untried(step, SPENT))
-        return passed
+        return skip
+
+    def passed(self, step: str) -> bool:
+        """Whether a step that a verdict does not need is skipped."""
+        return self.skips(step, self.case.budget.passed(EXPLAINED))
 
     def contenders(self, trials: Sequence[tuple[Trial, Kind]]) -> list[Contender]:
         """The trials as contenders; those that a deadline leaves out count as untried."""
@@ -191,8 +194,7 @@ class _Weighing:
             made = contend(trials, self.series, self.rows, self.step, self.reach, self.case.tell)
             known = {one.trial.added for one in made}
             for trial, _ in trials if time_is_up() else ():
-                if trial.added not in known:
-                    self.untried.append(Untried(f"the evidence for {' + '.join(trial.added)}", SPENT))
+                self.skips(f"the evidence for {' + '.join(trial.added)}", trial.added not in known)
         return made
 
     def run_of(self, trial: Trial) -> Trajectories:
@@ -230,7 +232,7 @@ class _Weighing:
         self, chosen: Trial, run: Trajectories, contenders: Sequence[Contender]
     ) -> tuple[list[Contender], bool]:
         """Contenders of other kinds than the search's, and whether the budget ended before all were compared."""
-        if self.late(OTHER_KINDS, SEARCHED):
+        if self.skips(OTHER_KINDS, self.case.budget.spent):
             return [], True
         case, found = self.case, self.found
         case.tell("trying other kinds of explanation")
@@ -239,8 +241,7 @@ class _Weighing:
                 _nominal(contenders), chosen, self.series, self.catalogue, found.noise, self.step, run, found.rounds,
                 [one.trial for one in contenders], self.reach, case.tell,
             )  # fmt: skip
-            if time_is_up():
-                self.untried.append(Untried(OTHER_KINDS, SPENT))
+            self.skips(OTHER_KINDS, time_is_up())
             return self.contenders(others), time_is_up()
 
     def of_the_nominal_model(
@@ -248,8 +249,7 @@ class _Weighing:
     ) -> tuple[list[Dependence], tuple[str, Contender] | None]:
         """What the nominal model's mismatch depends on, and the free map of it, as far as there is time; it `takes` about so long [s]."""
         case, budget = self.case, self.case.budget
-        if not budget.allows(takes, WEIGHED):
-            self.untried.append(Untried(BEFORE, SPENT))
+        if self.skips(BEFORE, not budget.allows(takes, WEIGHED)):
             return [], None
         case.tell("finding what the mismatch of the nominal model depends on")
         run = trajectories(self.found.nominal)
@@ -294,14 +294,13 @@ class _Weighing:
         """
         case, chosen = self.case, selection.chosen
         found = _with_best(self.found, trial, case)
-        if trial.added and chosen.kind == "effects" and not self.late(INTERVALS):
+        if trial.added and chosen.kind == "effects" and not self.passed(INTERVALS):
             found = _followed(found, case)
-            if time_is_up():
-                self.untried.append(Untried(INTERVALS, SPENT))
+            self.skips(INTERVALS, time_is_up())
         self.untried.extend(_unconverged(self.calibration.fit, found))
         between = covariance_between(found.fit.names, chosen, contest.hypotheses)
         unnamed = np.zeros_like(between)
-        if not self.late(SMALL_EFFECTS):
+        if not self.passed(SMALL_EFFECTS):
             case.tell("adding to the standard deviations what small effects may change")
             unnamed = _unnamed(found, self.catalogue, case)
         fit = with_robust_covariance(found.fit)
