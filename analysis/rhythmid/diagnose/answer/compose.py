@@ -34,6 +34,7 @@ from rhythmid.diagnose.case import EXPLAINED, Case
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
+from rhythmid.diagnose.search.proposals import WORTH
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
@@ -53,7 +54,6 @@ Array = NDArray[np.float64]
 SHOWN = 8  # alternatives listed
 ONE_CLOCK = "The clocks of command and measurement agree: an offset between them counts as delay."
 MORE_TIME = "none computed in the time given; a larger --budget tells which experiment separates best"
-RIVALS = 10.0  # difference of the information criterion up to which a rival is worth an experiment
 
 
 def explanations(contest: Contest, decision: Decision) -> tuple[Explanation, ...]:
@@ -159,7 +159,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
 
 def _rivals(one: Trial, best: Trial, groups: Sequence[Sequence[str]]) -> bool:
     """Whether the records do not tell a trial from the best one: by the information criterion or by the evidence."""
-    if len(one.added) == len(best.added) and one.bic() - best.bic() < RIVALS:
+    if len(one.added) == len(best.added) and one.bic() - best.bic() < WORTH:
         return True
     names, own = (set(t.names) for t in (one, best))
     return names != own and any(names ^ own <= set(group) for group in groups)
