@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,6 @@ from rhythmid.diagnose.answer.result import (
     Scored,
     settled,
 )
-from rhythmid.diagnose.answer.untold import without_untold
 from rhythmid.diagnose.answer.wording import (
     freed_value,
     location_of,
@@ -39,7 +39,9 @@ from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.diagnose.verdict_rules import LONGER_DELAY
+from rhythmid.elements.element import Element, Scales
 from rhythmid.identify.held_out_zeros import held_out_zero_notes
+from rhythmid.identify.natural_size import is_told, natural_size
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, rerun
 from rhythmid.identify.record_scales import scales
@@ -84,8 +86,8 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     repeats = noise_from_repeats(series)
     best = found.best
     fit = found.fit
-    missing = missing_effects(fit.model, decision, lambda name: estimated(fit, name))
-    missing = without_untold(missing, fit.model, scales(series, fit.model))
+    sizes = scales(series, fit.model)
+    missing = missing_effects(fit.model, decision, lambda name: estimated(fit, name), sizes)
     plain = FitQuality(found.nominal.nrmse(), contest.nominal.heldout_nrmse)
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
     groups = _indistinguishable(found.fit.model, decision)
@@ -204,9 +206,12 @@ def held_out_words(records: Sequence[Record], otherwise: str) -> str:
 
 
 def missing_effects(
-    model: Model, decision: Decision, estimate: Callable[[str], Estimate]
+    model: Model, decision: Decision, estimate: Callable[[str], Estimate], known: Scales
 ) -> tuple[MissingEffect, ...]:
-    """The named effects of a fitted model, with an `estimate` of each parameter, looked up by its name."""
+    """The named effects of a fitted model, with an `estimate` of each parameter, looked up by its name.
+
+    `known` are the scales of the records.
+    """
     return tuple(
         MissingEffect(
             term.element.name,
@@ -214,11 +219,21 @@ def missing_effects(
             term.element.equation,
             decision.shares[label],
             decision.probability[label],
-            {name: estimate(f"{label}.{name}") for name in term.values},
+            {name: _told(estimate(f"{label}.{name}"), name, term.element, known) for name in term.values},
         )
         for label in decision.named
         if (term := model.term(label)) is not None
     )
+
+
+def _told(found: Estimate, name: str, element: Element, known: Scales) -> Estimate:
+    """The estimate of an effect's parameter; its standard deviation is None where the records tell nothing of it.
+
+    An example is the speed over which a dry friction turns. Of the effect's own size, by which it was found, they always tell something.
+    """
+    usual = natural_size(element.parameter(name).unit, known)
+    told = name == element.size or not found.std or is_told(found.value, found.std, usual)
+    return found if told else replace(found, std=None)
 
 
 def estimated(fit: Fit, name: str) -> Estimate:

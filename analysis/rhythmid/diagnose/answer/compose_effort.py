@@ -13,7 +13,6 @@ from rhythmid.diagnose.answer.result import (
     Scored,
     settled,
 )
-from rhythmid.diagnose.answer.untold import without_untold
 from rhythmid.diagnose.answer.varied_motion import motion_varying
 from rhythmid.diagnose.answer.wording import (
     NOT_LOCATED,
@@ -42,9 +41,8 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     """The diagnosis."""
     decision, chosen, nominal = result.decision, result.chosen, result.nominal
     size = variation_of(result.search.balance)
-    missing = missing_effects(chosen.fit.model, decision, lambda name: _estimate(chosen, name))
     sizes = scales_of(result.search.balance, chosen.fit.model)
-    missing = without_untold(missing, chosen.fit.model, sizes)
+    missing = missing_effects(chosen.fit.model, decision, lambda name: _estimate(chosen, name), sizes)
     before, after = (
         FitQuality(one.fit.error / size, result.errors[one.key] / size) for one in (nominal, chosen)
     )
