@@ -207,7 +207,7 @@ class Model:
     def pruned(self, label: str) -> "Model":
         """A copy without the term called `label` and without those that need it."""
         reduced = replace(self, terms=tuple(term for term in self.terms if term.label != label))
-        idle = next((term.label for term in reduced.terms if reduced.lacking(term) is not None), None)
+        idle = next((term.label for term in reduced.terms if reduced.lacking(term.element) is not None), None)
         return reduced if idle is None else reduced.pruned(idle)
 
     def term(self, name: str) -> Term | None:
@@ -222,14 +222,14 @@ class Model:
     def check_borrowed(self) -> None:
         """Raise InputError when an element needs another one that the model lacks."""
         for term in self.terms:
-            if (lacking := self.lacking(term)) is not None:
+            if (lacking := self.lacking(term.element)) is not None:
                 raise InputError(f"element {term.label!r} needs {lacking!r}, which the model does not have")
 
-    def lacking(self, term: Term) -> str | None:
-        """Name of an element that `term` needs and the model lacks; None if there is none."""
-        if term.element.acts == "observation" and not self.setting.controlled:
+    def lacking(self, element: Element) -> str | None:
+        """Name of another element that `element` needs and the model lacks; None if there is none."""
+        if element.acts == "observation" and not self.setting.controlled:
             return CONTROLLER
-        for source, default in term.element.borrows.values():
+        for source, default in element.borrows.values():
             if self.borrowed(source, default) is None:
                 return source.split(".")[0]
         return None
@@ -362,6 +362,6 @@ def _model(document: Node, catalogue: Catalogue) -> Model:
         terms.append(_term(item, slot, catalogue, at, taken))
     model = Model(mass, tuple(terms), units)
     for (item, _), term in zip(places, model.terms):
-        if (lacking := model.lacking(term)) is not None:
+        if (lacking := model.lacking(term.element)) is not None:
             item.fail(f"{term.label} needs {lacking!r}, which the model does not have")
     return model

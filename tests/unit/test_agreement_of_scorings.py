@@ -9,7 +9,8 @@ from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.deadline import SPENT
 from rhythmid.diagnose import diagnosis as module
 from rhythmid.diagnose.agreement import DOUBTED
-from rhythmid.diagnose.answer.result import Diagnosis, Untried
+from rhythmid.diagnose.answer.result import Diagnosis
+from rhythmid.diagnose.case import Untried
 from rhythmid.diagnose.diagnosis import ANOTHER, Answer, diagnose
 from rhythmid.errors import InputError
 from rhythmid.model import Model

@@ -12,7 +12,7 @@ from rhythmid.diagnose.alternatives import LONGEST_DELAY, alternatives, fixed_va
 from rhythmid.diagnose.baseline import INPUT_DELAY
 from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.diagnose.search.round import Round
-from rhythmid.diagnose.search.score_tests import changes_of, guesses, score, sizes_along, trajectories
+from rhythmid.diagnose.search.score_tests import Score, changes_of, guesses, score, sizes_along, trajectories
 from rhythmid.diagnose.search.trial import Proposal, Trial
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.noise import NoiseModel
@@ -147,6 +147,14 @@ def test_kin_begin_where_the_family_has_ended(monkeypatch, plain):
     kept = proposed(monkeypatch, plain, chosen, CATALOGUE, "actuator_lag", rounds=rounds_of(plain))
     kin = next(one for one in kept if one.added == ("sensor_lag",))
     assert any(guess.get("sensor_lag.time_constant") == LAG["time_constant"] for guess in kin.guesses)
+
+
+def test_a_law_that_needs_the_effect_whose_place_it_would_take_is_not_proposed(monkeypatch, plain):
+    play = Score(CATALOGUE["freeplay"], {"gap": 1e-3}, 50.0, 1.0)
+    assert play.element.family == CATALOGUE["linear_spring"].family
+    known = [Round((play,), 0.0)]
+    kept = proposed(monkeypatch, plain, plain, CATALOGUE, "linear_spring", rounds=known)
+    assert not any("freeplay" in one.added for one in kept)
 
 
 def test_no_two_alternatives_have_the_same_effects(monkeypatch, plain):

@@ -155,4 +155,4 @@ def test_what_would_end_after_its_share_of_a_budget_is_not_begun(monkeypatch):
     monkeypatch.setattr(Budget, "passed", lambda self, share: share >= EXPLAINED)
     found = by_motion()
     assert found.missing[0].element == "coulomb_friction"
-    assert {search_of_motion.BEFORE[0], search_of_motion.INTERVALS[0]} <= set(cut_off(found))
+    assert {search_of_motion.BEFORE, search_of_motion.INTERVALS} <= set(cut_off(found))

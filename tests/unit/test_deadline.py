@@ -7,6 +7,7 @@ import pytest
 
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.deadline import SPENT, deadline, time_is_up, without_deadline
+from rhythmid.diagnose.case import Untried
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.trial import Origin, propose
 from rhythmid.identify import descent
@@ -73,7 +74,7 @@ def test_proposals_that_no_time_is_left_for_are_told():
     origin = Origin(tuple(starts), run.compiled.layout.states)
     with deadline(PAST):
         trials, excluded = run_trials([proposal], run.series, origin, WHITE, run.max_step)
-    assert trials == [] and excluded == [(("coulomb_friction",), SPENT)]
+    assert trials == [] and excluded == [Untried("coulomb_friction", SPENT)]
 
 
 def test_initial_states_of_unseen_records_are_fitted_whatever_the_time():

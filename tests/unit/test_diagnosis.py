@@ -10,7 +10,7 @@ from json_schema import conforming
 
 from machines import CATALOGUE, SHORT, hopper, only, records
 from rhythmid.deadline import SPENT
-from rhythmid.diagnose.answer.result import Untried
+from rhythmid.diagnose.case import Untried
 from rhythmid.diagnose.constants import LEFT, PRACTICAL
 from rhythmid.diagnose.diagnosis import BY_MOTION, Answer, diagnose, with_unit_warning
 from rhythmid.diagnose.rejections import RULES

@@ -12,7 +12,7 @@ from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.diagnose.effort import search as module
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.kin import contained
-from rhythmid.diagnose.effort.reference import residual_with_map
+from rhythmid.diagnose.effort.reference import Mapped, reference_of, residual_with_map
 from rhythmid.diagnose.effort.remainder import remainder_of
 from rhythmid.diagnose.effort.run import small_effects
 from rhythmid.diagnose.effort.search import EffortSearch, search_effort
@@ -28,8 +28,13 @@ FEW = CATALOGUE.without(*(name for name in CATALOGUE if name not in (*KEPT, "vis
 
 def errors_of(found: EffortSearch, *hypotheses: Fitted) -> list[float]:
     """Mean squared errors with which these, and last a free map beside the nominal model, predict what their fits did not see."""
-    fits = [*(one.linearised for one in hypotheses), found.reference.linearised]
+    fits = [*(one.linearised for one in hypotheses), reference(found).linearised]
     return [one.mean_square for one in predict(fits, found.blocks, found.balance.record)]
+
+
+def reference(found: EffortSearch) -> Mapped:
+    """The nominal model with free curves over the motion."""
+    return reference_of(found.balance, found.nominal, found.blocks)
 
 
 def left_of(balance: Balance, fitted: Fitted) -> np.ndarray:
@@ -101,7 +106,7 @@ def test_what_is_left_by_the_nominal_model_goes_with_the_speed(friction):
 def test_all_hypotheses_predict_the_same_rows(friction):
     count = len(friction.balance.measured)
     assert all(len(one.linearised.residual) == count for one in friction.hypotheses)
-    assert len(friction.reference.linearised.residual) == count
+    assert len(reference(friction).linearised.residual) == count
 
 
 def test_of_laws_of_which_one_contains_the_other_one_stands_alone(friction):
@@ -207,10 +212,11 @@ def test_effort_of_a_record_that_no_fit_has_seen_is_predicted(friction):
 def test_a_free_map_predicts_held_out_records_as_it_predicts_its_own(friction):
     found = friction
     seen = found.balance
-    again = residual_with_map(seen, found.nominal, found.reference)
-    np.testing.assert_allclose(again, found.reference.linearised.residual, atol=0.05 * variation_of(seen))
+    free = reference(found)
+    again = residual_with_map(seen, found.nominal, free)
+    np.testing.assert_allclose(again, free.linearised.residual, atol=0.05 * variation_of(seen))
     unseen = Balance.of([axis(7)], axis_model(), seen.bandwidth)
-    mapped = residual_with_map(unseen, found.nominal, found.reference)
+    mapped = residual_with_map(unseen, found.nominal, free)
     plain = left_of(unseen, found.nominal)
     assert np.sqrt(np.mean(mapped**2)) < 0.5 * np.sqrt(np.mean(plain**2))
 

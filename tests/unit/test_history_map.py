@@ -6,7 +6,7 @@ import numpy as np
 from axes import CATALOGUE, axis, axis_model
 
 from rhythmid.diagnose.diagnosis import diagnose
-from rhythmid.diagnose.effort.reference import HISTORY, history_of, residual_with_map
+from rhythmid.diagnose.effort.reference import HISTORY, history_of, reference_of, residual_with_map
 from rhythmid.diagnose.effort.search import search_effort
 from rhythmid.diagnose.evidence import cross_validate
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -33,7 +33,7 @@ def errors(record):
     """Shares of the effort that the nominal model misses of what its fit did not see: alone, with curves, and with a function of the past."""
     found = search_effort([record], axis_model(), NOTHING)
     nominal, blocks = found.nominal, found.blocks
-    beside = (found.reference, history_of(found.balance, nominal, blocks))
+    beside = (one(found.balance, nominal, blocks) for one in (reference_of, history_of))
     fits = [nominal.linearised, *(one.linearised for one in beside)]
     size = variation_of(found.balance)
     return [float(np.sqrt(np.mean(cross_validate(one, blocks).error ** 2))) / size for one in fits]

@@ -8,7 +8,7 @@ import pytest
 from answers import diagnosed
 
 from machines import CATALOGUE, SHORT, hopper, records, search_of
-from rhythmid.diagnose.answer.compose import RIVALS, _rivals, _without
+from rhythmid.diagnose.answer.compose import _rivals, _without
 from rhythmid.diagnose.answer.next_experiment import (
     MORE_FREE,
     NONE_NEEDED_FREE,
@@ -18,6 +18,7 @@ from rhythmid.diagnose.answer.next_experiment import (
     separation,
 )
 from rhythmid.diagnose.joints.joint_compose import _next
+from rhythmid.diagnose.search.proposals import WORTH
 from rhythmid.excitation.sequence import build
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.record_scales import scales
@@ -69,7 +70,7 @@ def test_a_rival_is_what_the_records_do_not_tell_from_the_best():
     one = search_of(estimate(rubbing, series, names=nominal.free), "coulomb_friction").best
     far = search_of(estimate(dragging, series, names=nominal.free), "quadratic_drag").best
     one, far = sorted((one, far), key=lambda trial: trial.bic())
-    assert far.bic() - one.bic() > RIVALS
+    assert far.bic() - one.bic() > WORTH
     assert _rivals(one, one, ()) and not _rivals(far, one, ())
     assert _rivals(far, one, (("coulomb_friction", "quadratic_drag"),))
 

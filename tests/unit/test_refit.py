@@ -142,6 +142,23 @@ def test_a_parameter_with_many_minima_is_followed_to_the_deepest_from_one_to_the
     assert trials[0].model.value("stiffness_jump.time") == 7.0
 
 
+def test_of_models_that_fit_alike_the_first_proposed_comes_first_whichever_worker_finishes_first(monkeypatch):
+    def descend(model, run, names, noise, starts, *_, **__) -> Descent:
+        steps = np.full(len(names), 1e-9), np.ones(run.states)
+        return Descent(model, tuple(starts), (), 100.0, 64, True, "", (), steps, None)
+
+    monkeypatch.setattr(refit, "descend", descend)
+    sizes = {"constant_force": {"force": 0.1}, "quadratic_damping": {"coefficient": 0.1}}
+    made = [propose(hopper(), CATALOGUE[name], [size], ()) for name, size in sizes.items()]
+    origin = Origin((np.array([0.15, 0.0]),), ("position", "velocity"))
+    for order in (list, reversed):
+        monkeypatch.setattr(
+            refit, "fork_map", lambda work, cases, order=order: [(i, work(cases[i])) for i in order(range(len(cases)))]
+        )  # fmt: skip
+        trials, _ = run_trials(made, [STILL], origin, QUIET, 1e-3)
+        assert [trial.added for trial in trials] == [(name,) for name in sizes]
+
+
 def test_what_a_guess_fixes_is_kept_with_what_was_fitted_from_it(monkeypatch):
     """As the side of a stop: a position fitted for the upper one means nothing for the lower one."""
     element = CATALOGUE["end_stop_contact"]
@@ -184,7 +201,7 @@ def test_a_descent_that_still_falls_steeply_goes_on_where_others_have_been_left(
     start = descend(
         friction(100.0).model, run, ("coulomb_friction.force",), QUIET, [np.zeros(2)], refit.SKETCH
     )
-    end = refit._carried_on(start, run, ("coulomb_friction.force",), QUIET)
+    end = refit._carried_on(start, run, QUIET)
     assert end.converged == arrives
     assert sum(left) <= refit.THOROUGH + refit.SKETCH
     assert arrives or sum(left) == refit.BRIEF

@@ -69,6 +69,17 @@ def test_the_evidence_keeps_predictions_to_seven_digits():
     assert read.follows == math.inf and contest_of(ledger(replace(made, follows=0.3), 0.1, {})).follows == 0.3
 
 
+def test_the_evidence_keeps_the_laws_that_contain_an_effect_and_the_effects_that_it_is_at_its_end():
+    whole = replace(
+        supposed("a", predicted(0.1), richer={"a": ("b",)}, family={"a": "friction"}),
+        beyond={"a": ("c", "d")},
+    )
+    read = contest_of(json.loads(json.dumps(ledger(contest(NOMINAL, whole), 0.1, {})))).hypotheses[1]
+    assert {name: tuple(laws) for name, laws in read.richer.items()} == whole.richer
+    assert {name: tuple(laws) for name, laws in read.beyond.items()} == whole.beyond
+    assert read.family == whole.family
+
+
 def answered(made, verdict: str, *missing: dict) -> dict:
     """An answer as it was kept, whatever its verdict was then."""
     kept = {"verdict": verdict, "missing": list(missing), "joint_probability": 0.0, "indistinguishable": []}

@@ -1,9 +1,12 @@
 """What the records tell of a parameter: a value whose standard deviation exceeds it, and all that there may be, is no answer."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 
-from rhythmid.diagnose.answer.result import Estimate, MissingEffect
-from rhythmid.diagnose.answer.untold import without_untold
+from rhythmid.diagnose.answer.compose import missing_effects
+from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.identify import identify
 from rhythmid.identify.natural_size import are_told
@@ -53,8 +56,13 @@ def test_a_nuisance_that_the_records_do_not_determine_is_given_no_standard_devia
 
     def judged(force: float, transition: tuple[float, float]) -> list[float | None]:
         values = {"force": Estimate(0.01, force, "N"), "transition": Estimate(*transition, "m/s")}
-        effect = MissingEffect("coulomb_friction", "force", "F", 1.0, 1.0, values)
-        return [one.std for one in without_untold((effect,), model, known)[0].parameters.values()]
+        decision: Any = SimpleNamespace(
+            named=("coulomb_friction",),
+            shares={"coulomb_friction": 1.0},
+            probability={"coulomb_friction": 1.0},
+        )
+        (effect,) = missing_effects(model, decision, lambda name: values[name.split(".")[1]], known)
+        return [one.std for one in effect.parameters.values()]
 
     tiny = 0.01 * known.velocity
     assert judged(0.005, (0.0, 230.0)) == [0.005, None]

@@ -110,8 +110,8 @@ def _reduced(chosen: Trial, weighed: Sequence[Trial]) -> Iterator[Proposal]:
 def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Trial]) -> Iterator[Proposal]:
     """The base model with other elements of the family of `term`.
 
-    Only elements that scored in some round and are no hypothesis yet are proposed. The first guesses include the fitted
-    values of the other members of the family.
+    Only elements that scored in some round, that are no hypothesis yet and that need nothing that the base model lacks are
+    proposed. The first guesses include the fitted values of the other members of the family.
     """
     family = term.element.family
     scored: dict[str, list[Score]] = {}
@@ -126,9 +126,10 @@ def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Tri
     }
     there = {other.element.name for other in base.model.terms} | set(places) | {term.element.name}
     for name, scores in scored.items():
-        if name in there:
+        element = scores[0].element
+        if name in there or base.model.lacking(element) is not None:
             continue
-        made = propose(base.model, scores[0].element, [one.start for one in scores[:2]], base.added)
+        made = propose(base.model, element, [one.start for one in scores[:2]], base.added)
         own = made.added[-1]
         ends = [
             {_renamed(key, label, own): value.value for key, value in trial.model.parameters.items()}

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhythmid.deadline import time_is_up
-from rhythmid.diagnose.constants import FOLLOWS, LATEST, NOT_HELD, NOT_HELD_LEAST, STANDS_IN
+from rhythmid.diagnose.constants import CONTRADICTS, FOLLOWS, LATEST, NOT_HELD_LEAST, STANDS_IN
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.early_output import EARLIEST
@@ -191,7 +191,7 @@ def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, t
         return kept
     period = nominal_period(np.diff(held[0].inputs.stamps))
     delay, std = fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY]
-    if not math.isfinite(std) or delay > -max(NOT_HELD * std, NOT_HELD_LEAST * period):
+    if not math.isfinite(std) or delay > -max(CONTRADICTS * std, NOT_HELD_LEAST * period):
         return kept
     late = -delay / period
     if late > EARLIEST:

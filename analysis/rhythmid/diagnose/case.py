@@ -52,6 +52,14 @@ class Budget:
 
 
 @dataclass(frozen=True)
+class Untried:
+    """A candidate, or another step, that was not tried, and the reason."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
 class Case:
     """Records and the nominal model, the catalogue to search, and the workers.
 

@@ -60,15 +60,15 @@ OWN_LINE = 1.0
 # Friction by direction mistaken for a fading actuator has 0.004 and less where the motion is made once; any effect has 0.13 and
 # more where the motion is repeated
 RECURS = 0.05
-# share of the effort that an actuator's effect must leave for moving the machine: an effect that takes more than half explains no motion
-MOVES = 0.5
 
 # --- what a verdict needs -------------------------------------------------------------------------------------------
 # joint probability from which names are stated
 STATED = 0.8
 # share of all that free maps and names together explain that the names must explain, for the names to be stated
 EXPLAINED_BY_NAMES = 0.8
-# the same share, from which the names explain the main part
+# more than half: share of the mismatch from which names explain the main part of it; of an actuator's action, from which it is more than a
+# gain; of the effort that an actuator's effect has to leave to move the machine; and of the measurement that a model may miss in a
+# predictable way (from the residual's own past), beyond which it describes another machine
 MAINLY = 0.5
 # chance that the catalogue holds the truth, as a function of the unexplained share of the explainable mismatch: one half at
 # `ADEQUATE`, falling with the power `STEEPNESS` (fitted to sealed cases whose truth was in the catalogue or not: docs/proof.md)
@@ -88,9 +88,6 @@ VAGUENESS = 3.0
 # are one. First runs on recordings of real machines stated 28 names of friction (docs/real.md), of which 26 were accepted: odds of
 # 13, where the sealed cases from which `HOLDS` comes have 5
 PRIOR_ODDS = {"friction": 3.0}
-# share of the measurement that a model may miss in a predictable way (from the residual's own past) for an answer to be given:
-# a model that misses more than half describes another machine
-MISSES_MOST = 0.5
 # smallest detectable effect, as a share of the measurement, from which the records decide nothing: as large as the error that
 # the refitted model of a machine may leave and still count as identified
 BLIND = 0.2
@@ -123,10 +120,9 @@ BETTER_TOGETHER = 0.6
 LATEST = 2.5
 # ratio to which a delay far from its start must lower the error; otherwise it is only a surrogate for missing physics
 STANDS_IN = 0.7
-# a negative delay shows an input that was not held if it exceeds this many standard deviations and this share of a sample
-NOT_HELD, NOT_HELD_LEAST = 4.0, 0.05
-# the records contradict a nominal value if they differ by this many standard deviations and this share of the value
-CONTRADICTS, CONTRADICTS_LEAST = 4.0, 0.02
+# the records contradict a nominal value if they differ by this many standard deviations (by chance once in 30 000 records) and this
+# share of the value; for the delay of an input that is taken for held, this share of a sample
+CONTRADICTS, CONTRADICTS_LEAST, NOT_HELD_LEAST = 4.0, 0.02, 0.05
 
 # --- which other explanations compete -------------------------------------------------------------------------------
 # number of laws of one quantity from which they more likely approximate one law than act separately; real springs have two

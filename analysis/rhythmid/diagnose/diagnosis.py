@@ -17,9 +17,9 @@ from rhythmid.diagnose.admission import Admitted, admitted
 from rhythmid.diagnose.agreement import HOW, contradictions, tells_all
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
-from rhythmid.diagnose.answer.result import Diagnosis, Untried
+from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.baseline import check_free
-from rhythmid.diagnose.case import LEAST_CALIBRATION, SEARCHED, Budget, Case
+from rhythmid.diagnose.case import LEAST_CALIBRATION, SEARCHED, Budget, Case, Untried
 from rhythmid.diagnose.constants import DRIVES_IT, QUASI_STATIC
 from rhythmid.diagnose.effort.found_delay import with_found_delay
 from rhythmid.diagnose.effort.run import EffortResult, effort_run

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.alternatives import alternatives
 from rhythmid.diagnose.baseline import Calibration
-from rhythmid.diagnose.case import EXPLAINED, WEIGHED, Case
+from rhythmid.diagnose.case import EXPLAINED, WEIGHED, Case, Untried
 from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.contenders import (
     Contender,
@@ -51,21 +51,21 @@ from rhythmid.diagnose.tick_interval import ticks_followed
 from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
-from rhythmid.elements.element import Scales
 from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.covariance import covariance_of
 from rhythmid.identify.output_error import Fit, rerun
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.robust_covariance import with_robust_covariance
+from rhythmid.identify.series import Series
 from rhythmid.identify.student import autocorrelation_time
 
 # hypotheses that compete beside those of the search, if there is time
-OTHER_KINDS = ("freed values, longer delays, other places, free functions and related laws",)
-INTERVALS = ("intervals followed along the likelihood, and integration in finer steps",)
-BEFORE = ("what the mismatch of the nominal model depends on",)
-AGAIN = ("what the model that was chosen in the end leaves, which is told of the one before it",)
-SMALL_EFFECTS = ("what small effects that no hypothesis names add to the standard deviations",)
-RERUN = ("free runs over the held-out records for the report",)
+OTHER_KINDS = "freed values, longer delays, other places, free functions and related laws"
+INTERVALS = "intervals followed along the likelihood, and integration in finer steps"
+BEFORE = "what the mismatch of the nominal model depends on"
+AGAIN = "what the model that was chosen in the end leaves, which is told of the one before it"
+SMALL_EFFECTS = "what small effects that no hypothesis names add to the standard deviations"
+RERUN = "free runs over the held-out records for the report"
 
 
 @dataclass(frozen=True)
@@ -99,96 +99,47 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
 
 def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     calibration = _with_jitter(scoring)
-    seen = list(calibration.series)
-    unseen = tuple(scoring.unseen) if case.holdout else ()
-    known = case.catalogue.within(scales(seen, calibration.fit.model))
-    found = search(seen, calibration.fit, case.nominal, known, case.pool, case.tell, case.budget)
+    series, unseen = calibration.series, scoring.unseen if case.holdout else ()
+    known = case.catalogue.within(scales(series, calibration.fit.model))
+    found = search(series, calibration.fit, case.nominal, known, case.pool, case.tell, case.budget)
     case.tell("weighing the hypotheses on data that no fit has seen")
-    step = found.nominal.run.max_step
-    rows = rows_of(seen, unseen, found.noise)
-    kinds: list[tuple[Trial, Kind]] = [(t, "effects" if t.added else "nominal") for t in found.trials]
-    reach = reach_of(found.fit.chi2, found.fit.samples)
-    with deadline(case.budget.at(WEIGHED)):
-        contenders = contend(kinds, seen, rows, step, reach, case.tell)
-        found = _weighed(found, found.trials, contenders)
+    weighing = _Weighing(case, calibration, known, found, rows_of(series, unseen, found.noise))
+    contenders = weighing.contenders([(t, "effects" if t.added else "nominal") for t in found.trials])
     run = trajectories(found.fit)
-    sizes = scales(seen, found.fit.model)
-    structured = calibration.fit.noise.predictable
-    chosen = select(_contest(contenders, {}, rows, found, run, sizes, structured)).chosen
-    trial = _trial_of(chosen, contenders)
-    if trial.added != found.best.added:
-        run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
-    nominal = next(one.trial for one in contenders if one.kind == "nominal")
-    uncompared = False
-    if case.budget.spent:
-        found, uncompared = _untried(found, OTHER_KINDS), True
-    elif chosen.kind != "freed_value":
-        weighed = [one.trial for one in contenders]
-        case.tell("trying other kinds of explanation")
-        with deadline(case.budget.at(WEIGHED)):
-            others = alternatives(
-                nominal, trial, seen, known, found.noise, step, run, found.rounds, weighed, reach, case.tell
-            )
-            found = _told(found, OTHER_KINDS)
-            more = contend(others, seen, rows, step, reach, case.tell)
-            found = _weighed(found, [one for one, _ in others], more)
-            uncompared = time_is_up()
-        contenders += more
+    trial = _trial_of(select(weighing.contest(contenders, run)).chosen, contenders)
+    if trial.key != found.best.key:
+        run = weighing.run_of(trial)
+    more, uncompared = weighing.of_other_kinds(trial, run, contenders)
+    contenders += more
     case.tell("locating what is left")
     began = time.monotonic()
-    after = dependences(run, rows, case.pool)
-    took = time.monotonic() - began
+    after = before = dependences(run, weighing.rows, case.pool)
     refitted = None
-    before = after
-    if trial.added and not case.budget.allows(took, WEIGHED):
-        before, found = [], _untried(found, BEFORE)
-    elif trial.added:
-        case.tell("finding what the mismatch of the nominal model depends on")
-        nominal_run = trajectories(found.nominal)
-        before = dependences(nominal_run, rows, case.pool)
-        if not case.budget.spent:
-            refitted = refitted_map(nominal, before, nominal_run, seen, rows, step)
-    maps = _maps(after, refitted, contenders, rows)
-    contest = replace(_contest(contenders, maps, rows, found, run, sizes, structured), uncompared=uncompared)
+    if trial.added:
+        before, refitted = weighing.of_the_nominal_model(contenders, time.monotonic() - began)
+    maps = weighing.maps(after, refitted, contenders)
+    contest = weighing.contest(contenders, run, maps, uncompared)
     selection = select(contest)
-    if selection.chosen.key != trial.added:
+    if selection.chosen.key != trial.key:
         trial = _trial_of(selection.chosen, contenders)
-        run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
-        if case.budget.passed(EXPLAINED):
-            found = _untried(found, AGAIN)
-        else:
-            after = dependences(run, rows, case.pool)
-            contest = replace(contest, maps=_maps(after, refitted, contenders, rows))
+        run = weighing.run_of(trial)
+        if not weighing.passed(AGAIN):
+            after = dependences(run, weighing.rows, case.pool)
+            contest = replace(contest, maps=weighing.maps(after, refitted, contenders))
             selection = select(contest)
             trial = _trial_of(selection.chosen, contenders)
-    found = _with_best(found, trial, case)
-    least = _detectable(contenders, selection.chosen, rows)
-    if trial.added and selection.chosen.kind == "effects":
-        late = case.budget.passed(EXPLAINED)
-        found = _untried(found, INTERVALS) if late else _told(_followed(found, case), INTERVALS)
-    found = replace(found, excluded=(*found.excluded, *_unconverged(calibration.fit, found)))
-    between = covariance_between(found.fit.names, selection.chosen, contest.hypotheses)
-    unnamed = np.zeros((len(found.fit.names),) * 2)
-    if case.budget.passed(EXPLAINED):
-        found = _untried(found, SMALL_EFFECTS)
-    else:
-        case.tell("adding to the standard deviations what small effects may change")
-        unnamed = _unnamed(found, known, case)
-    shown = unseen
-    if unseen and case.budget.passed(EXPLAINED):
-        shown, found = (), _untried(found, RERUN)
-    fit = with_robust_covariance(found.fit)
-    errors = size_errors(fit.model, selection.chosen.elements, fit.std)
+    least = weighing.detectable(contenders, selection.chosen)
+    found, errors = weighing.settled(trial, contest, selection)
+    shown = () if unseen and weighing.passed(RERUN) else unseen
     if shown:
         case.tell("running both models over the held-out records")
-    found = replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed))
     nominal_there, chosen_there = (
         rerun(one.model, shown, found.noise, one.run.max_step) for one in (found.nominal, found.fit)
     )
     return FreeRunResult(
         scoring,
         calibration,
-        found,
+        replace(found, excluded=(*found.excluded, *weighing.untried)),
         tuple(before),
         tuple(after),
         nominal_there,
@@ -199,6 +150,162 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         least,
         errors,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Weighing:
+    """The models of a search and what they are weighed with; `untried` grows by what there is no time for."""
+
+    case: Case
+    calibration: Calibration
+    catalogue: Catalogue
+    found: Search
+    rows: Rows
+    untried: list[Untried] = field(default_factory=list)
+
+    @property
+    def series(self) -> tuple[Series, ...]:
+        """The fitted series."""
+        return self.calibration.series
+
+    @property
+    def step(self) -> float:
+        """Largest integration step [s] of any model."""
+        return self.found.nominal.run.max_step
+
+    @property
+    def reach(self) -> float:
+        """The chi2 that a model needs in order to compete."""
+        return reach_of(self.found.fit.chi2, self.found.fit.samples)
+
+    def skips(self, step: str, skip: bool) -> bool:
+        """Whether to skip a step for lack of time; it then counts as untried."""
+        if skip:
+            self.untried.append(Untried(step, SPENT))
+        return skip
+
+    def passed(self, step: str) -> bool:
+        """Whether a step that a verdict does not need is skipped."""
+        return self.skips(step, self.case.budget.passed(EXPLAINED))
+
+    def contenders(self, trials: Sequence[tuple[Trial, Kind]]) -> list[Contender]:
+        """The trials as contenders; those that a deadline leaves out count as untried."""
+        with deadline(self.case.budget.at(WEIGHED)):
+            made = contend(trials, self.series, self.rows, self.step, self.reach, self.case.tell)
+            known = {one.trial.added for one in made}
+            for trial, _ in trials if time_is_up() else ():
+                self.skips(f"the evidence for {' + '.join(trial.added)}", trial.added not in known)
+        return made
+
+    def run_of(self, trial: Trial) -> Trajectories:
+        """The run of a trial, fitted under the search's noise."""
+        return trajectories(whole_fit(trial, self.series, self.found.noise, self.step, pool=self.case.pool))
+
+    def contest(
+        self,
+        contenders: Sequence[Contender],
+        run: Trajectories,
+        maps: Mapping[str, Prediction] | None = None,
+        uncompared: bool = False,
+    ) -> Contest:
+        """The contest of these contenders, whose effects are judged along a `run`, and of free `maps`."""
+        found, sizes = self.found, scales(self.series, self.found.fit.model)
+
+        def shape(trial: Trial) -> dict[str, float]:
+            return shape_of(trial.model, trial.added, run, sizes)
+
+        return Contest(
+            tuple(hypotheses_of(contenders, self.rows, shape)),
+            maps or {},
+            len({score.element.name for one in found.rounds for score in one.scores}),
+            self.rows.size,
+            PRACTICAL,
+            PRACTICAL,
+            follows=FOLLOWS,
+            cut_short=found.cut_short,
+            structured=self.calibration.fit.noise.predictable,
+            structured_after=found.noise.predictable,
+            uncompared=uncompared,
+        )
+
+    def of_other_kinds(
+        self, chosen: Trial, run: Trajectories, contenders: Sequence[Contender]
+    ) -> tuple[list[Contender], bool]:
+        """Contenders of other kinds than the search's, and whether the budget ended before all were compared."""
+        if self.skips(OTHER_KINDS, self.case.budget.spent):
+            return [], True
+        case, found = self.case, self.found
+        case.tell("trying other kinds of explanation")
+        with deadline(case.budget.at(WEIGHED)):
+            others = alternatives(
+                _nominal(contenders), chosen, self.series, self.catalogue, found.noise, self.step, run, found.rounds,
+                [one.trial for one in contenders], self.reach, case.tell,
+            )  # fmt: skip
+            self.skips(OTHER_KINDS, time_is_up())
+            return self.contenders(others), time_is_up()
+
+    def of_the_nominal_model(
+        self, contenders: Sequence[Contender], takes: float
+    ) -> tuple[list[Dependence], tuple[str, Contender] | None]:
+        """What the nominal model's mismatch depends on, and the free map of it, as far as there is time; it `takes` about so long [s]."""
+        case, budget = self.case, self.case.budget
+        if self.skips(BEFORE, not budget.allows(takes, WEIGHED)):
+            return [], None
+        case.tell("finding what the mismatch of the nominal model depends on")
+        run = trajectories(self.found.nominal)
+        before = dependences(run, self.rows, case.pool)
+        if budget.spent:
+            return before, None
+        return before, refitted_map(_nominal(contenders), before, run, self.series, self.rows, self.step)
+
+    def maps(
+        self,
+        found: Sequence[Dependence],
+        refitted: tuple[str, Contender] | None,
+        contenders: Sequence[Contender],
+    ) -> dict[str, Prediction]:
+        """Predictions of the free maps, under the autocorrelation time of the contenders.
+
+        A refitted map replaces the linearised one of the same quantity where it predicts better.
+        """
+        rows, time = self.rows, remembered(contenders, self.rows)
+        maps = {
+            one.quantity: prediction(one.found, rows.blocks, time, measured_errors(one.found.error, rows))
+            for one in found
+        }
+        if refitted is not None:
+            quantity, one = refitted
+            made = prediction(one.found, rows.blocks, time, one.error)
+            maps[quantity] = max(maps.get(quantity, made), made, key=lambda each: each.score)
+        return maps
+
+    def detectable(self, contenders: Sequence[Contender], chosen: Hypothesis) -> float:
+        """The smallest detectable rms in these records, relative to the size that errors are a share of."""
+        error = next(one.error for one in contenders if one.trial.key == chosen.key)
+        time = autocorrelation_time(error, self.rows.record)
+        return detectable(error, time) / max(self.rows.size, 1e-300)
+
+    def settled(
+        self, trial: Trial, contest: Contest, selection: Selection
+    ) -> tuple[Search, dict[str, float]]:
+        """The search with the fit of the chosen `trial`, and the relative standard deviations of its effects' sizes.
+
+        The fit's covariance contains the choice of the model and small missing effects; those of the sizes do not.
+        """
+        case, chosen = self.case, selection.chosen
+        found = _with_best(self.found, trial, case)
+        if trial.added and chosen.kind == "effects" and not self.passed(INTERVALS):
+            found = _followed(found, case)
+            self.skips(INTERVALS, time_is_up())
+        self.untried.extend(_unconverged(self.calibration.fit, found))
+        between = covariance_between(found.fit.names, chosen, contest.hypotheses)
+        unnamed = np.zeros_like(between)
+        if not self.passed(SMALL_EFFECTS):
+            case.tell("adding to the standard deviations what small effects may change")
+            unnamed = _unnamed(found, self.catalogue, case)
+        fit = with_robust_covariance(found.fit)
+        errors = size_errors(fit.model, chosen.elements, fit.std)
+        return replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed)), errors
 
 
 def _followed(found: Search, case: Case) -> Search:
@@ -212,32 +319,13 @@ def _followed(found: Search, case: Case) -> Search:
     return found
 
 
-def _told(found: Search, untried: tuple[str, ...]) -> Search:
-    """The search with `untried` added to its exclusions if time is up."""
-    return _untried(found, untried) if time_is_up() else found
-
-
-def _untried(found: Search, what: tuple[str, ...]) -> Search:
-    """The search with `what` added to its exclusions for lack of time."""
-    return replace(found, excluded=(*found.excluded, (what, SPENT)))
-
-
-def _weighed(found: Search, trials: Sequence[Trial], contenders: Sequence[Contender]) -> Search:
-    """The search, extended if time is up by the fitted models that were not weighed on unseen data."""
-    if not time_is_up():
-        return found
-    known = {one.trial.added for one in contenders}
-    for trial in trials:
-        if trial.added not in known:
-            found = _untried(found, (f"the evidence for {' + '.join(trial.added)}",))
-    return found
-
-
-def _unconverged(nominal: Fit, found: Search) -> list[tuple[tuple[str, ...], str]]:
+def _unconverged(nominal: Fit, found: Search) -> list[Untried]:
     """Which of the refitted nominal model and the chosen model were stopped by a deadline before convergence."""
     named = {"nominal": nominal, "chosen" if found.best.added else "nominal": found.fit}
     return [
-        ((f"convergence of the {name} model",), SPENT) for name, fit in named.items() if fit.message == SPENT
+        Untried(f"convergence of the {name} model", SPENT)
+        for name, fit in named.items()
+        if fit.message == SPENT
     ]
 
 
@@ -284,6 +372,10 @@ def _with_jitter(scoring: Scoring) -> Calibration:
     return replace(found, fit=fit, series=fit.run.series, notes=(*found.notes, note))
 
 
+def _nominal(contenders: Sequence[Contender]) -> Trial:
+    return next(one.trial for one in contenders if one.kind == "nominal")
+
+
 def _trial_of(hypothesis: Hypothesis, contenders: Sequence[Contender]) -> Trial:
     return next(one.trial for one in contenders if one.trial.key == hypothesis.key)
 
@@ -297,60 +389,3 @@ def _with_best(found: Search, trial: Trial, case: Case) -> Search:
     others = [one for one in found.trials if one.added != trial.added]
     trials = tuple(sorted([*others, trial], key=lambda one: one.bic()))
     return replace(found, best=trial, fit=fit, nominal=nominal, trials=trials)
-
-
-def _contest(
-    contenders: Sequence[Contender],
-    maps: Mapping[str, Prediction],
-    rows: Rows,
-    found: Search,
-    run: Trajectories,
-    sizes: Scales,
-    structured: float,
-) -> Contest:
-    names = {score.element.name for one in found.rounds for score in one.scores}
-
-    def shape(trial: Trial) -> dict[str, float]:
-        return shape_of(trial.model, trial.added, run, sizes)
-
-    hypotheses = tuple(hypotheses_of(contenders, rows, shape))
-    return Contest(
-        hypotheses,
-        maps,
-        len(names),
-        rows.size,
-        PRACTICAL,
-        PRACTICAL,
-        follows=FOLLOWS,
-        cut_short=found.cut_short,
-        structured=structured,
-        structured_after=found.noise.predictable,
-    )
-
-
-def _maps(
-    found: Sequence[Dependence],
-    refitted: tuple[str, Contender] | None,
-    contenders: Sequence[Contender],
-    rows: Rows,
-) -> dict[str, Prediction]:
-    """Predictions of the free maps, under the autocorrelation time of the contenders.
-
-    A refitted map replaces the linearised one of the same quantity where it predicts better.
-    """
-    time = remembered(contenders, rows)
-    maps = {
-        one.quantity: prediction(one.found, rows.blocks, time, measured_errors(one.found.error, rows))
-        for one in found
-    }
-    if refitted is not None:
-        quantity, one = refitted
-        made = prediction(one.found, rows.blocks, time, one.error)
-        maps[quantity] = max(maps[quantity], made, key=lambda each: each.score) if quantity in maps else made
-    return maps
-
-
-def _detectable(contenders: Sequence[Contender], chosen: Hypothesis, rows: Rows) -> float:
-    """The smallest detectable rms in these records, relative to the size that errors are a share of."""
-    error = next(one.error for one in contenders if one.trial.key == chosen.key)
-    return detectable(error, autocorrelation_time(error, rows.record)) / max(rows.size, 1e-300)

@@ -17,7 +17,6 @@ from rhythmid.diagnose.constants import (
     FALSE_ALARM,
     MAINLY,
     MISMATCH,
-    MOVES,
     OWN_LINE,
     RECURS,
     REST,
@@ -127,7 +126,7 @@ SHAPES: Mapping[str, float] = {
     AT_END: EDGE,
     "acts_within_records": EDGE,
     "own_frequency": OWN_LINE,
-    "moves_the_machine": MOVES,
+    "moves_the_machine": MAINLY,
     "more_than_gain": MAINLY,
     "more_than_motion": RECURS,
 }

@@ -4,7 +4,7 @@ This allows changes of the rules or of the constants to be tried on stored answe
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -15,6 +15,9 @@ from rhythmid.diagnose.selection import Contest, select
 from rhythmid.diagnose.verdict import Decision, decide
 
 DIGITS = 8  # significant digits of each number in the ledger
+# fields that are plain data already
+OF_CONTEST = ("candidates", "size", "practical", "cut_short", "uncompared", "structured", "structured_after")
+OF_HYPOTHESIS = ("kind", "free", "heldout_nrmse", "richer", "family", "beyond")
 
 
 def ledger(contest: Contest, detectable: float, size_errors: Mapping[str, float]) -> dict[str, Any]:
@@ -24,27 +27,17 @@ def ledger(contest: Contest, detectable: float, size_errors: Mapping[str, float]
             {
                 "elements": list(one.elements),
                 "names": list(one.names),
-                "kind": one.kind,
-                "free": one.free,
-                "heldout_nrmse": one.heldout_nrmse,
                 "shape": {name: value for name, value in one.shape.items() if math.isfinite(value)},
-                "richer": {name: list(others) for name, others in one.richer.items()},
-                "family": dict(one.family),
+                **{name: getattr(one, name) for name in OF_HYPOTHESIS},
                 **_written(one.prediction),
             }
             for one in (*contest.hypotheses, *contest.ruled_out)
         ],
         "ruled_out": len(contest.ruled_out),
         "maps": {quantity: _written(one) for quantity, one in contest.maps.items()},
-        "candidates": contest.candidates,
-        "size": contest.size,
-        "practical": contest.practical,
+        **{name: getattr(contest, name) for name in OF_CONTEST},
         "unnamed": contest.unnamed,
         "follows": contest.follows if math.isfinite(contest.follows) else None,
-        "cut_short": contest.cut_short,
-        "uncompared": contest.uncompared,
-        "structured": contest.structured,
-        "structured_after": contest.structured_after,
         "detectable": detectable,
         "size_errors": {
             label: error if math.isfinite(error) else None for label, error in size_errors.items()
@@ -66,19 +59,20 @@ def _read(data: dict[str, Any]) -> Prediction:
     return Prediction(density, error, samples, None if unseen is None else np.array(unseen, dtype=bool))
 
 
+def _given(data: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """These fields of a ledger, as far as it has them: one of an earlier version may have fewer."""
+    return {name: data[name] for name in names if name in data}
+
+
 def contest_of(data: dict[str, Any]) -> Contest:
     """The contest that a ledger describes."""
     hypotheses = tuple(
         Hypothesis(
             tuple(one["elements"]),
             tuple(one["names"]),
-            one["kind"],
-            one["free"],
-            _read(one),
-            one["heldout_nrmse"],
-            one["shape"],
-            {name: tuple(others) for name, others in one["richer"].items()},
-            family=one.get("family", {}),
+            prediction=_read(one),
+            shape=one["shape"],
+            **_given(one, OF_HYPOTHESIS),
         )
         for one in data["hypotheses"]
     )
@@ -86,16 +80,10 @@ def contest_of(data: dict[str, Any]) -> Contest:
     return Contest(
         hypotheses[:competing],
         {quantity: _read(one) for quantity, one in data["maps"].items()},
-        data["candidates"],
-        data["size"],
-        data["practical"],
-        data.get("unnamed", data["practical"]),
-        hypotheses[competing:],
-        data.get("follows") or math.inf,
-        data.get("cut_short", False),
-        float(data.get("structured", 0.0)),
-        float(data.get("structured_after", 0.0)),
-        data.get("uncompared", False),
+        unnamed=data.get("unnamed", data["practical"]),
+        ruled_out=hypotheses[competing:],
+        follows=data.get("follows") or math.inf,
+        **_given(data, OF_CONTEST),
     )
 
 

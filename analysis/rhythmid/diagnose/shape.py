@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rhythmid.diagnose.constants import FAR_RANGES, REACH
 from rhythmid.diagnose.search.score_tests import Trajectories
+from rhythmid.diagnose.size_error import departure
 from rhythmid.diagnose.static_law import INSTANTS, SAME, curved
 from rhythmid.elements.element import Element, Scales
 from rhythmid.elements.first_guess import NoGuess
@@ -88,7 +89,7 @@ def _size(term: Term, sizes: Scales) -> float:
     except NoGuess:
         return math.inf
     usual = min((one for one in guesses if one > 0.0), default=0.0)
-    return abs(term.values[name].value - absent) / usual if usual > 0.0 else math.inf
+    return departure(term) / usual if usual > 0.0 else math.inf
 
 
 def _own_frequency(term: Term, sizes: Scales) -> float:

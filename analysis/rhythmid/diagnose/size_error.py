@@ -3,7 +3,16 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from rhythmid.model import Model
+from rhythmid.model import Model, Term
+
+
+def departure(term: Term) -> float:
+    """Difference of an effect's size from the value at which the effect is absent.
+
+    A limit is absent at infinity; the size of its effect is its inverse, with the same relative error.
+    """
+    value, absent = term.values[term.element.size].value, term.element.absent
+    return abs(value) if math.isinf(absent) else abs(value - absent)
 
 
 def size_errors(model: Model, labels: Sequence[str], std: Mapping[str, float]) -> dict[str, float]:
@@ -24,9 +33,6 @@ def size_errors(model: Model, labels: Sequence[str], std: Mapping[str, float]) -
         term = model.term(label)
         if term is None or term.element.rigid or f"{label}.{term.element.size}" not in std:
             continue
-        value, absent = term.values[term.element.size].value, term.element.absent
-        # a limit is absent at infinity; the size of its effect is its inverse, with the same relative error
-        departure = abs(value) if math.isinf(absent) else abs(value - absent)
-        error = std[f"{label}.{term.element.size}"]
-        found[label] = error / departure if departure > 0.0 and math.isfinite(error) else math.inf
+        size, error = departure(term), std[f"{label}.{term.element.size}"]
+        found[label] = error / size if size > 0.0 and math.isfinite(error) else math.inf
     return found

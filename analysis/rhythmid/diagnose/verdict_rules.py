@@ -12,7 +12,6 @@ from rhythmid.diagnose.constants import (
     EXPLAINED_BY_NAMES,
     LEFT,
     MAINLY,
-    MISSES_MOST,
     PRACTICAL,
     STATED,
     UNNAMED_EFFORT,
@@ -115,7 +114,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
     VerdictRule(
         "lost",
         "the autocorrelated part of the error of the chosen hypothesis, as a share of what was measured",
-        MISSES_MOST,
+        MAINLY,
         "undecided",
         "with every effect that was tried the model misses {missed:.0f} % of what was measured; {lost:.0f} points of this error are autocorrelated, hence not "
         "noise: something that was not recorded may act, or units, signs or the structure of the model are wrong",

@@ -288,6 +288,12 @@ class Element:
                 return parameter
         raise KeyError(name)
 
+    def scaled(self, values: Mapping[str, float], factor: float) -> dict[str, float]:
+        """The values with the effect scaled by a factor; the size of a limit, which is absent at infinity, is divided by it."""
+        value = values[self.size]
+        size = value / factor if isinf(self.absent) else self.absent + factor * (value - self.absent)
+        return {**values, self.size: size}
+
     def forbids(self, values: Mapping[str, float], factor: float) -> bool:
         """Whether `factor` times the effect with these values has a physically impossible sign: the size would be
         beyond a bound that restricts it to one sign."""
@@ -296,7 +302,7 @@ class Element:
         if isinf(self.absent):
             return factor < 0.0
         low, high = self.parameter(self.size).bounds
-        size = self.absent + factor * (values[self.size] - self.absent)
+        size = self.scaled(values, factor)[self.size]
         return (size < low and low >= self.absent) or (size > high and high <= self.absent)
 
     def within(self, scales: Scales) -> "Element":

@@ -7,7 +7,7 @@ forces.
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -19,6 +19,9 @@ MASS = 0.03  # share of the machine's mass
 MOTION = 0.2  # share of its position, speed or acceleration
 CYCLE = 0.02  # share of a period of the motion, as a time
 PLAIN = 0.1  # value of a dimensionless parameter
+# smallest and largest factor by which a score test scales an effect's first guess. At zero its shape parameters have no derivative, and far
+# from the guess the test is an extrapolation
+LEAST_FACTOR, LARGEST_FACTOR = 0.05, 30.0
 FURTHER = 4.0  # factor of lengths, speeds and times in a second guess
 GUESSES = (  # the same in words, for the reference page
     f"for N {FORCE:g} of the typical force; for N/m, N*s/m and similar units {COEFFICIENT:g} of the coefficient that gives that force; "
@@ -68,6 +71,24 @@ def generic_guesses(element: "Element", scales: "Scales") -> list[dict[str, floa
     if element.size and any(guess[element.size] == element.absent for guess in guesses):
         raise NoGuess(f"no {element.size} other than {element.absent:g} lies within its bounds")
     return guesses
+
+
+def limited(factor: float) -> float:
+    """The factor from a score test, with its sign, between `LEAST_FACTOR` and `LARGEST_FACTOR`."""
+    return math.copysign(min(max(abs(factor), LEAST_FACTOR), LARGEST_FACTOR), factor)
+
+
+def rescaled(element: "Element", values: Mapping[str, float], factor: float) -> dict[str, float]:
+    """A first guess whose effect is scaled by the factor from a score test, inside the bounds of its size.
+
+    Unchanged for an element without a size, and for a limit, whose effect is not proportional to its value.
+    """
+    if not element.size or math.isinf(element.absent):
+        return dict(values)
+    low, high = element.parameter(element.size).bounds
+    margin = LEAST_FACTOR * abs(values[element.size] - element.absent)
+    scaled = element.scaled(values, limited(factor))
+    return scaled | {element.size: min(max(scaled[element.size], low + margin), high)}
 
 
 def _open(element: "Element", parameter: "Parameter") -> bool:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,8 @@ from rhythmid.diagnose.answer.result import (
     MissingEffect,
     Remainder,
     Scored,
-    Untried,
     settled,
 )
-from rhythmid.diagnose.answer.untold import without_untold
 from rhythmid.diagnose.answer.wording import (
     freed_value,
     location_of,
@@ -36,11 +35,14 @@ from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
 from rhythmid.diagnose.reference_scale import scale_told
+from rhythmid.diagnose.search.proposals import WORTH
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.diagnose.verdict_rules import LONGER_DELAY
+from rhythmid.elements.element import Element, Scales
 from rhythmid.identify.held_out_zeros import held_out_zero_notes
+from rhythmid.identify.natural_size import is_told, natural_size
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, rerun
 from rhythmid.identify.record_scales import scales
@@ -55,7 +57,6 @@ Array = NDArray[np.float64]
 SHOWN = 8  # alternatives listed
 ONE_CLOCK = "The clocks of command and measurement agree: an offset between them counts as delay."
 MORE_TIME = "none computed in the time given; a larger --budget tells which experiment separates best"
-RIVALS = 10.0  # difference of the information criterion up to which a rival is worth an experiment
 
 
 def explanations(contest: Contest, decision: Decision) -> tuple[Explanation, ...]:
@@ -86,8 +87,8 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     repeats = noise_from_repeats(series)
     best = found.best
     fit = found.fit
-    missing = missing_effects(fit.model, decision, lambda name: estimated(fit, name))
-    missing = without_untold(missing, fit.model, scales(series, fit.model))
+    sizes = scales(series, fit.model)
+    missing = missing_effects(fit.model, decision, lambda name: estimated(fit, name), sizes)
     plain = FitQuality(found.nominal.nrmse(), contest.nominal.heldout_nrmse)
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
     groups = _indistinguishable(found.fit.model, decision)
@@ -102,11 +103,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     needed = decision.verdict != "consistent" and not settles
     heldout = {one.key: one.heldout_nrmse for one in contest.hypotheses}
     alternatives = tuple(
-        Alternative(
-            tuple(t.element(label).name for label in t.added),
-            t.bic() - best.bic(),
-            heldout.get(t.key),
-        )
+        Alternative(t.names, t.bic() - best.bic(), heldout.get(t.key))
         for t in [t for t in found.trials if t.key != best.key][:SHOWN]
     )
     part = "record" if result.scoring.kind == "free_run" else "window"
@@ -149,7 +146,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
             *recalibrated(case.nominal, fit.model, {name: fit.std[name] for name in fit.names}),
             *_delay_told(case.nominal, fit),
         ),
-        excluded=tuple(Untried(" + ".join(added), why) for added, why in found.excluded),
+        excluded=found.excluded,
         heldout=held_out_words(case.holdout, f"the last fifth of every {part}"),
         notes=(
             *notes,
@@ -166,7 +163,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
 
 def _rivals(one: Trial, best: Trial, groups: Sequence[Sequence[str]]) -> bool:
     """Whether the records do not tell a trial from the best one: by the information criterion or by the evidence."""
-    if len(one.added) == len(best.added) and one.bic() - best.bic() < RIVALS:
+    if len(one.added) == len(best.added) and one.bic() - best.bic() < WORTH:
         return True
     names, own = (set(t.names) for t in (one, best))
     return names != own and any(names ^ own <= set(group) for group in groups)
@@ -211,9 +208,12 @@ def held_out_words(records: Sequence[Record], otherwise: str) -> str:
 
 
 def missing_effects(
-    model: Model, decision: Decision, estimate: Callable[[str], Estimate]
+    model: Model, decision: Decision, estimate: Callable[[str], Estimate], known: Scales
 ) -> tuple[MissingEffect, ...]:
-    """The named effects of a fitted model, with an `estimate` of each parameter, looked up by its name."""
+    """The named effects of a fitted model, with an `estimate` of each parameter, looked up by its name.
+
+    `known` are the scales of the records.
+    """
     return tuple(
         MissingEffect(
             term.element.name,
@@ -221,11 +221,21 @@ def missing_effects(
             term.element.equation,
             decision.shares[label],
             decision.probability[label],
-            {name: estimate(f"{label}.{name}") for name in term.values},
+            {name: _told(estimate(f"{label}.{name}"), name, term.element, known) for name in term.values},
         )
         for label in decision.named
         if (term := model.term(label)) is not None
     )
+
+
+def _told(found: Estimate, name: str, element: Element, known: Scales) -> Estimate:
+    """The estimate of an effect's parameter; its standard deviation is None where the records tell nothing of it.
+
+    An example is the speed over which a dry friction turns. Of the effect's own size, by which it was found, they always tell something.
+    """
+    usual = natural_size(element.parameter(name).unit, known)
+    told = name == element.size or not found.std or is_told(found.value, found.std, usual)
+    return found if told else replace(found, std=None)
 
 
 def estimated(fit: Fit, name: str) -> Estimate:

@@ -11,10 +11,8 @@ from rhythmid.diagnose.answer.result import (
     FitQuality,
     Location,
     Scored,
-    Untried,
     settled,
 )
-from rhythmid.diagnose.answer.untold import without_untold
 from rhythmid.diagnose.answer.varied_motion import motion_varying
 from rhythmid.diagnose.answer.wording import (
     NOT_LOCATED,
@@ -24,7 +22,7 @@ from rhythmid.diagnose.answer.wording import (
     recalibrated,
     summary_of,
 )
-from rhythmid.diagnose.case import Case
+from rhythmid.diagnose.case import Case, Untried
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.found_delay import delay_told, found_delay
 from rhythmid.diagnose.effort.run import EffortResult
@@ -43,9 +41,8 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     """The diagnosis."""
     decision, chosen, nominal = result.decision, result.chosen, result.nominal
     size = variation_of(result.search.balance)
-    missing = missing_effects(chosen.fit.model, decision, lambda name: _estimate(chosen, name))
     sizes = scales_of(result.search.balance, chosen.fit.model)
-    missing = without_untold(missing, chosen.fit.model, sizes)
+    missing = missing_effects(chosen.fit.model, decision, lambda name: _estimate(chosen, name), sizes)
     before, after = (
         FitQuality(one.fit.error / size, result.errors[one.key] / size) for one in (nominal, chosen)
     )

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from rhythmid.diagnose.constants import VAGUE
+from rhythmid.diagnose.size_error import departure
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.identify.output_error import Fit
 from rhythmid.report.quantity import with_std, with_written_unit
@@ -26,11 +27,9 @@ def own_sizes(decision: Decision, fit: Fit, size_errors: Mapping[str, float]) ->
         term = fit.model.term(label)
         if term is None or label not in size_errors:
             continue
-        name, absent = f"{label}.{term.element.size}", term.element.absent
-        value = term.values[term.element.size]
-        departure = abs(value.value - absent) if abs(absent) < float("inf") else abs(value.value)
-        own = size_errors[label] * departure
-        if size_errors[label] <= VAGUE and fit.std.get(name, 0.0) > VAGUE * departure:
+        name, value, size = f"{label}.{term.element.size}", term.values[term.element.size], departure(term)
+        own = size_errors[label] * size
+        if size_errors[label] <= VAGUE and fit.std.get(name, 0.0) > VAGUE * size:
             told = with_written_unit(with_std(value.value, own), value.unit)
             found.append(
                 f"{name}: {told} in its own fit, from which the probability of the name follows. The larger standard deviation of the answer "

@@ -143,7 +143,7 @@ def findings(
         command=command,
         models=models,
         at_bound=found.fit.at_bound,
-        unconverged=tuple(_names(trial.model, trial.added) for trial in found.trials if not trial.converged),
+        unconverged=tuple(trial.names for trial in found.trials if not trial.converged),
         hints=hints_of(diagnosis.indistinguishable, elements),
         correlation=_correlation(found.fit),
     )
@@ -242,10 +242,6 @@ def _transfer(
 def _estimates(fit: Fit) -> dict[str, dict[str, float | str | None]]:
     """Every parameter of a fit, as the answer states it."""
     return {name: asdict(estimated(fit, name)) for name in fit.model.parameters}
-
-
-def _names(model: Model, labels: Sequence[str]) -> tuple[str, ...]:
-    return tuple(term.element.name for label in labels if (term := model.term(label)) is not None)
 
 
 def _elements(found: Search, nominal: Model) -> list[Element]:

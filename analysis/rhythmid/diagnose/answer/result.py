@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
+from rhythmid.diagnose.case import Untried
 from rhythmid.diagnose.family import MissingFamily
 from rhythmid.diagnose.hypothesis import Kind, ScoringKind, Verdict
 from rhythmid.diagnose.rejections import Rejection
@@ -129,14 +130,6 @@ class Scored:
     bandwidth: float | None
     reason: str
     averaged: int
-
-
-@dataclass(frozen=True)
-class Untried:
-    """A candidate, or another step, that was not tried, and the reason."""
-
-    name: str
-    reason: str
 
 
 def settled(verdict: Verdict, indistinguishable: tuple[tuple[str, ...], ...], unnamed: bool) -> bool:

@@ -12,6 +12,7 @@ from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales
+from rhythmid.elements.first_guess import rescaled
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import Alignment, EffortFit, size_of
 from rhythmid.identify.least_squares import orthonormal
@@ -24,10 +25,6 @@ SEEN = ("force", "actuator")  # slots whose elements show in the effort balance
 # the same where a controller computes the effort from its reference
 SEEN_BY_REFERENCE = (*SEEN, "command")
 NO_MOTOR = "it acts on the force of an actuator, and the effort that was recorded is zero: no motor acts"
-LARGEST = 30.0  # largest start of an effect, times its first guess
-LEAST_START = (
-    0.05  # smallest start, share of its first guess: at zero the effect's shape parameters have no derivative
-)
 
 
 @dataclass(frozen=True)
@@ -136,15 +133,8 @@ def extended(model: Model, start: Start, factor: float = 1.0) -> tuple[Model, st
     """The model with the addition, scaled to `factor` times the guess, and the label of the addition."""
     if start.element is None:
         return (with_freed(model, [start.name]) if start.kind == "freed_value" else model), start.name
-    element, values = start.element, dict(start.values)
-    if element.size and math.isfinite(element.absent) and not element.clock:
-        name = element.size
-        low, high = element.parameter(name).bounds
-        if abs(factor) < LEAST_START:
-            factor = math.copysign(LEAST_START, factor)
-        value = element.absent + float(np.clip(factor, -LARGEST, LARGEST)) * (values[name] - element.absent)
-        margin = LEAST_START * abs(values[name] - element.absent)
-        values[name] = float(np.clip(value, low + margin if low > -math.inf else low, high))
+    element = start.element
+    values = start.values if element.clock else rescaled(element, start.values, factor)
     grown = model.with_element(element, values)
     label = grown.terms[-1].label
     if element.clock:  # all ticks of the record depend on the period: it is one of the usual values, and no descent finds another

@@ -66,8 +66,7 @@ class EffortSearch:
     nominal : the nominal model with its free values fitted.
     hypotheses : all fitted hypotheses, including the nominal one.
     ruled_out : fitted hypotheses that explain no motion.
-    reference, beyond : the nominal and the chosen model with free curves over the motion.
-    chosen : the hypothesis with which the search ended.
+    chosen, beyond : the hypothesis with which the search ended, and the same with free curves over the motion.
     not_tried : candidates that were not tried, by name, with the reason; including those that the budget cut off.
     candidates : number of effects that were tried.
     cut_short : whether the budget ended the search.
@@ -79,7 +78,6 @@ class EffortSearch:
     hypotheses: tuple[Fitted, ...]
     ruled_out: tuple[Fitted, ...]
     chosen: Fitted
-    reference: Mapped
     beyond: Mapped
     not_tried: Mapping[str, str]
     candidates: int
@@ -109,12 +107,11 @@ def search_effort(
     with without_deadline():  # the reference for all comparisons
         nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors, balance)
     blocks = Blocks.of(balance.record, GAP)
-    reference = reference_of(balance, nominal, blocks)
     search = _Search(
-        balance, catalogue, blocks, nominal, reference, [nominal], promising, recorded_efforts(records, model)
-    )
-    chosen = nominal
-    budget = budget or Budget()
+        balance, catalogue, blocks, nominal, reference_of(balance, nominal, blocks), [nominal], promising,
+        recorded_efforts(records, model),
+    )  # fmt: skip
+    chosen, budget = nominal, budget or Budget()
     for number in range(most):
         if budget.spent:
             search.cut.update(search.cut_off(chosen))
@@ -130,9 +127,10 @@ def search_effort(
     best = search.found[max(range(len(made)), key=lambda index: made[index].score)]
     for one in (chosen, best) if best is not chosen else (chosen,):
         search.reduce(one)
-    beyond = reference_of(balance, chosen, search.blocks)
+    untried = not_tried(catalogue, model, scales_of(balance, model), balance) | search.cut
     return EffortSearch(
-        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, not_tried(catalogue, model, scales_of(balance, model), balance) | search.cut, len(search.tried), bool(search.cut),
+        balance, blocks, nominal, tuple(search.found), search.set_aside, chosen, reference_of(balance, chosen, blocks),
+        untried, len(search.tried), bool(search.cut),
     )  # fmt: skip
 
 
@@ -167,14 +165,16 @@ class _Search:
         """What is not tried after the budget is spent: all candidates, or further effects beside those of the parent."""
         if parent.elements:
             return {f"further effects beside {' and '.join(parent.elements)}": SPENT}
-        model = parent.fit.model
-        starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
-        return {one.name: SPENT for one in starts}
+        return {one.name: SPENT for one in self._starts(parent.fit.model)}
+
+    def _starts(self, model: Model) -> list[Start]:
+        """First guesses of all additions to a model, by the scales of the records."""
+        return starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
 
     def further(self, parent: Fitted) -> Fitted | None:
         """The best model with one more effect, or with a related law in place of one; None where a rule rejects it."""
-        model = parent.fit.model
-        starts = starts_of(self.catalogue, model, scales_at(self.balance, parent.fit), self.balance)
+        sizes = scales_at(self.balance, parent.fit)
+        starts = starts_of(self.catalogue, parent.fit.model, sizes, self.balance)
         screened = screen(self.balance, parent.fit, starts)
         self.tried.update(one.start.name for one in screened)
         tried = len(screened)
@@ -301,9 +301,8 @@ class _Search:
         made: Fitted | None = base
         for name in law.beyond:
             if made is not None and all(name != t.element.name for t in made.fit.model.terms):
-                model = made.fit.model
-                starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
-                screened = screen(self.balance, made.fit, [one for one in starts if one.name == name])
+                starts = [one for one in self._starts(made.fit.model) if one.name == name]
+                screened = screen(self.balance, made.fit, starts)
                 made = self.fitted(made, screened[0]) if screened else None
         self._keep(made or base)
 
@@ -313,10 +312,9 @@ class _Search:
 
     def _simplify(self, base: Fitted, element: Element) -> None:
         """Fit the base with each simpler law that the element contains."""
-        model = base.fit.model
         simpler = [
             start
-            for start in starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
+            for start in self._starts(base.fit.model)
             if start.element is not None and element.name in start.element.special_case_of
         ]
         for one in screen(self.balance, base.fit, simpler):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.deadline import SPENT, deadline, time_is_up
-from rhythmid.diagnose.case import SEARCHED, Budget
+from rhythmid.diagnose.case import SEARCHED, Budget, Untried
 from rhythmid.diagnose.constants import PRACTICAL
 from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
@@ -83,7 +83,7 @@ class Search:
     noise: NoiseModel
     trials: tuple[Trial, ...]
     rounds: tuple[Round, ...]
-    excluded: tuple[tuple[tuple[str, ...], str], ...]
+    excluded: tuple[Untried, ...]
     cut_short: bool = False
 
 
@@ -125,7 +125,7 @@ class _State:
     noise: NoiseModel
     trials: Mapping[tuple[str, ...], Trial]
     rounds: tuple[Round, ...]
-    excluded: tuple[tuple[tuple[str, ...], str], ...]
+    excluded: tuple[Untried, ...]
     gained: float = 0.0
 
     @property
@@ -137,7 +137,7 @@ class _State:
         """The state with these trials added."""
         return replace(self, trials={**self.trials, **{one.key: one for one in trials}})
 
-    def without(self, tried: Sequence[tuple[tuple[str, ...], str]]) -> "_State":
+    def without(self, tried: Sequence[Untried]) -> "_State":
         """The state with additional exclusions: models that were not tried or could not be simulated."""
         return replace(self, excluded=(*self.excluded, *tried))
 
@@ -198,12 +198,12 @@ def _searched(
         if grant is None:
             break
         state = _with_effect(task, state, grant, last=len(grant.winner.added) >= most)
-    cut_short = ended or any(why == SPENT for _, why in state.excluded)
+    cut_short = ended or any(one.reason == SPENT for one in state.excluded)
     if state.best.added and budget.spent:
-        state = state.without([(("backward elimination",), SPENT)])
+        state = state.without([Untried("backward elimination", SPENT)])
     elif state.best.added:
         state = _reduced(task, state)
-        state = state.without([(("part of the backward elimination",), SPENT)] if time_is_up() else [])
+        state = state.without([Untried("part of the backward elimination", SPENT)] if time_is_up() else [])
     best, noise, ranked = _ranked(task, state)
     fit = whole_fit(best, series, noise, task.step, pool=pool)
     return Search(
@@ -223,15 +223,15 @@ def _begun(task: _Task, first: Round) -> _State:
     return _State(base, base, fit, fit.noise, {(): base}, (first,), tuple(lost))
 
 
-def _cut_off(state: _State) -> list[tuple[tuple[str, ...], str]]:
+def _cut_off(state: _State) -> list[Untried]:
     """What is not tried after the budget is spent.
 
     The elements that scored best, or if nothing was scored after the last effect, all further effects beside those found.
     """
     added, last = state.best.added, state.rounds[-1]
     if last.added != added:
-        return [((f"further effects beside {' and '.join(added)}",), SPENT)]
-    return [((one.element.name,), SPENT) for one, _ in distinct(last.scores, REFITTED)]
+        return [Untried(f"further effects beside {' and '.join(added)}", SPENT)]
+    return [Untried(one.element.name, SPENT) for one, _ in distinct(last.scores, REFITTED)]
 
 
 def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:

@@ -15,7 +15,7 @@ from rhythmid.diagnose.search.trial import Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit, minimise, normalised_error
-from rhythmid.identify.series import Series
+from rhythmid.identify.series import Series, record_of
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
@@ -105,7 +105,7 @@ def by_record(fit: Fit) -> list[list[tuple[Array, Series]]]:
     """Residuals and series of a fit, grouped by the record from which they are."""
     found: dict[str, list[tuple[Array, Series]]] = {}
     for residual, one in zip(fit.residuals, fit.run.series):
-        found.setdefault(one.record or one.name, []).append((residual, one))
+        found.setdefault(record_of(one), []).append((residual, one))
     return list(found.values())
 
 

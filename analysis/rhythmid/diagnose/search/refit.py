@@ -5,13 +5,15 @@ the others lack must not be taken for coloured noise.
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.deadline import SPENT, time_is_up
+from rhythmid.diagnose.case import Untried
 from rhythmid.diagnose.search.trial import (
     FAINTER,
     Origin,
@@ -23,7 +25,7 @@ from rhythmid.diagnose.search.trial import (
     trial_of,
 )
 from rhythmid.errors import InputError
-from rhythmid.identify.descent import Descent, descend, out_of_reach
+from rhythmid.identify.descent import NOTHING, Descent, descend, out_of_reach
 from rhythmid.identify.free_run import FreeRun, prepare_run, start_of, sufficient
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import INTEGRATION, Fit, minimise
@@ -66,6 +68,21 @@ def _run_of(trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step:
     )
 
 
+def _descent(
+    model: Model,
+    run: FreeRun,
+    noise: NoiseModel,
+    starts: Sequence[Array],
+    iterations: int,
+    differences: tuple[Array, Array] | None = None,
+    similar: Mapping[str, float] = NOTHING,
+    reach: float = math.inf,
+) -> Descent:
+    """The descent of all free parameters of a model; see `descend`."""
+    names = tuple(model.free)
+    return descend(model, run, names, noise, starts, iterations, None, TOLERANCE, differences, reach, similar)
+
+
 def reach_of(chi2: float, samples: int) -> float:
     """Chi2 that a model must reach to compete with the best one, whose `chi2` was obtained with `samples` samples."""
     return chi2 + max(LEAST_EXCESS, EXCESS * samples)
@@ -88,7 +105,6 @@ def _fit_proposal(
     if time_is_up():
         raise InputError(SPENT)
     whole = prepare_run(proposal.model, series, max_step)
-    names = tuple(proposal.model.free)
     best: Descent | None = None
     run = whole
     failure: InputError | None = None
@@ -104,7 +120,7 @@ def _fit_proposal(
         try:
             begin = _extended(model, whole, origin)
             fine = fine_enough(whole, model, begin, noise.variance**0.5)
-            end = descend(model, fine, names, noise, begin, SKETCH, tolerance=TOLERANCE, similar=steps)
+            end = _descent(model, fine, noise, begin, SKETCH, similar=steps)
         except InputError as error:
             failure = error
             continue
@@ -117,22 +133,18 @@ def _fit_proposal(
         assert failure is not None
         raise failure
     run = fine_enough(run, best.model, best.starts, noise.variance**0.5)
-    best = _carried_on(best, run, names, noise, reach)
+    best = _carried_on(best, run, noise, reach)
     of_effect = f"{proposal.added[-1]}." if proposal.added else ""
     guessed = [name for name in (proposal.guesses or ({},))[0] if name.startswith(of_effect)]
     flat = _flat(best.model, best.differences[0], guessed)
     if flat and not time_is_up():
         back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
-        again = descend(
-            back, run, names, noise, best.starts, BRIEF, None, TOLERANCE, similar=_steps(best, run, flat)
-        )
+        again = _descent(back, run, noise, best.starts, BRIEF, similar=_steps(best, run, flat))
         best = min(best, again, key=lambda end: end.chi2)
     return outcome_of(best, run, noise)
 
 
-def _carried_on(
-    end: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel, reach: float = math.inf
-) -> Descent:
+def _carried_on(end: Descent, run: FreeRun, noise: NoiseModel, reach: float = math.inf) -> Descent:
     """Continue the descent to `BRIEF` iterations, and further as long as chi2 falls steeply.
 
     In a narrow, curved valley a descent is slow but may end in the deepest minimum. It is abandoned if at its rate it would not
@@ -142,7 +154,7 @@ def _carried_on(
     while not (end.converged or time_is_up()) and (done < BRIEF or (steep and done < THOROUGH)):
         if len(costs) > 1 and out_of_reach(costs[-2], costs[-1], (THOROUGH - done) / SKETCH, reach):
             break
-        end = descend(end.model, run, names, noise, end.starts, SKETCH, None, TOLERANCE, end.differences)
+        end = _descent(end.model, run, noise, end.starts, SKETCH, end.differences)
         costs.append(end.chi2)
         done, steep = done + SKETCH, end.chi2 < STEEP * costs[-2]
     return end
@@ -160,16 +172,13 @@ def _hops(trial: Trial, series: Sequence[Series]) -> dict[str, float]:
 def _in_deepest(trial: Trial, series: Sequence[Series], max_step: float) -> Outcome:
     """The outcome of a trial in the deepest minimum of its newest effect that hops from one minimum to the next reach."""
     run = _run_of(trial, series, trial.noise, max_step)
-    names = tuple(trial.model.free)
-    best = descend(trial.model, run, names, trial.noise, trial.starts, 1, None, TOLERANCE, trial.differences)
+    best = _descent(trial.model, run, trial.noise, trial.starts, 1, trial.differences)
     for name, distance in _hops(trial, series).items():
-        best = _hopped(best, run, names, trial.noise, name, distance)
+        best = _hopped(best, run, trial.noise, name, distance)
     return outcome_of(best, run, trial.noise)
 
 
-def _hopped(
-    best: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel, name: str, distance: float
-) -> Descent:
+def _hopped(best: Descent, run: FreeRun, noise: NoiseModel, name: str, distance: float) -> Descent:
     """Hop along a parameter whose minima lie about this distance apart, as long as the next one is deeper."""
     low, high = best.model.parameters[name].bounds
     for _ in range(HOPS):
@@ -181,7 +190,7 @@ def _hopped(
                 continue
             moved = before.model.with_values({name: value})
             steps = _steps(before, run, [name])
-            again = descend(moved, run, names, noise, before.starts, BRIEF, None, TOLERANCE, similar=steps)
+            again = _descent(moved, run, noise, before.starts, BRIEF, similar=steps)
             best = min(best, again, key=lambda end: end.chi2)
         if best.chi2 > before.chi2 - 1.0:
             break
@@ -215,26 +224,17 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
         guesses = element.first_guesses(scales(series, trial.model))
         known = {tuple(guess[name.rpartition(".")[2]] for name in flat) for guess in guesses}
         run = _run_of(trial, series, trial.noise, max_step)
-        free = tuple(trial.model.free)
         steps = steps_by_name(trial.model, run.compiled.layout.states, trial.differences, flat)
         found: list[Descent] = []
         for share in (1.0, *FAINTER):
             for values in sorted(known):
                 moved = trial.model.with_values(dict(zip(flat, (share * value for value in values))))
-                try:
-                    found.append(
-                        descend(
-                            moved, run, free, trial.noise, trial.starts, 1, tolerance=TOLERANCE, similar=steps
-                        )
-                    )
-                except InputError:
-                    continue
+                with suppress(InputError):
+                    found.append(_descent(moved, run, trial.noise, trial.starts, 1, similar=steps))
         if not found:
             continue
         lead = min(found, key=lambda end: end.chi2)
-        end = descend(
-            lead.model, run, free, trial.noise, lead.starts, THOROUGH, None, TOLERANCE, lead.differences
-        )
+        end = _descent(lead.model, run, trial.noise, lead.starts, THOROUGH, lead.differences)
         if end.chi2 < best.chi2:
             best = trial_of(trial.added, trial.model, outcome_of(end, run, trial.noise), trial.noise)
     return best
@@ -266,7 +266,7 @@ def run_trials(
     enough: Sequence[float] | None = None,
     reach: float = math.inf,
     tell: Tell = silent,
-) -> tuple[list[Trial], list[tuple[tuple[str, ...], str]]]:
+) -> tuple[list[Trial], list[Untried]]:
     """Fit all proposals in parallel, beginning from the `origin`.
 
     First a few iterations from each guess, until chi2 is below `enough`. The promising trials are then fitted to convergence, as
@@ -280,11 +280,11 @@ def run_trials(
         return _fit_proposal(case[0], series, origin, noise, max_step, case[1], reach)
 
     trials: list[Trial] = []
-    excluded: list[tuple[tuple[str, ...], str]] = []
-    done = fork_map(one, list(zip(proposals, goals)))
-    for index, result in counted(done, len(proposals), "fits", tell):
+    excluded: list[Untried] = []
+    done = counted(fork_map(one, list(zip(proposals, goals))), len(proposals), "fits", tell)
+    for index, result in _in_order(done):
         if isinstance(result, Exception):
-            excluded.append((proposals[index].added, str(result)))
+            excluded.append(Untried(" + ".join(proposals[index].added), str(result)))
         else:
             trials.append(trial_of(proposals[index].added, proposals[index].model, result, noise))
     if not trials or time_is_up():
@@ -352,27 +352,21 @@ def under_noise(
     others = [trial for trial in trials if not _settled(trial, noise)]
 
     def one(trial: Trial) -> Outcome:
-        run, names = _run_of(trial, series, noise, max_step), tuple(trial.model.free)
-        end = descend(
-            trial.model,
-            run,
-            names,
-            noise,
-            trial.starts,
-            iterations,
-            None,
-            TOLERANCE,
-            trial.differences,
-            reach,
-        )
+        run = _run_of(trial, series, noise, max_step)
+        end = _descent(trial.model, run, noise, trial.starts, iterations, trial.differences, reach=reach)
         return outcome_of(end, run, noise)
 
     again = [
         trial_of(others[index].added, others[index].model, result, noise)
-        for index, result in fork_map(one, others)
+        for index, result in _in_order(fork_map(one, others))
         if not isinstance(result, Exception)
     ]
     return sorted([*done, *again], key=lambda trial: trial.bic())
+
+
+def _in_order(done: Iterable[tuple[int, Outcome | Exception]]) -> list[tuple[int, Outcome | Exception]]:
+    """Results in the order of their items, so that ties do not depend on which worker finishes first."""
+    return sorted(done, key=lambda result: result[0])
 
 
 def _settled(trial: Trial, noise: NoiseModel) -> bool:

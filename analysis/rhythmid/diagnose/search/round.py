@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.diagnose.case import Untried
 from rhythmid.diagnose.free_functions import filtered
 from rhythmid.diagnose.search.score_tests import (
     Change,
@@ -143,7 +144,7 @@ def _filters(fit: Fit, pool: ThreadPoolExecutor | None) -> Iterator[tuple[Array,
         yield from one.columns
 
 
-def not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[tuple[tuple[str, ...], str]]:
+def not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[Untried]:
     """Candidates of the catalogue that the first round could not score, each with the reason."""
     known = candidates(catalogue, nominal.model.setting, sizes_along(trajectories(nominal)))
     scored = {score.element.name for score in first.scores}
@@ -151,7 +152,7 @@ def not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[tuple[tu
     reasons = dict(known.not_tried) | dict.fromkeys(
         lost, "from every first guess the model diverges or behaves as without the effect"
     )
-    return [((name,), why) for name, why in reasons.items()]
+    return [Untried(name, why) for name, why in reasons.items()]
 
 
 def scored_in_windows(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> list[Score]:

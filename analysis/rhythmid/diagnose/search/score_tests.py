@@ -24,6 +24,7 @@ from rhythmid.diagnose.search.tangent import Tangent, tangent
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales
+from rhythmid.elements.first_guess import limited, rescaled
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model
 from rhythmid.identify.drive import controlled
@@ -70,28 +71,14 @@ class Score:
     @property
     def start(self) -> dict[str, float]:
         """First guess for a refit, scaled by the size from the score test."""
-        if not self.element.size or math.isinf(self.element.absent):
-            return dict(self.values)  # a limit: its effect is not proportional to its value
-        scaled = dict(self.values)
-        name = self.element.size
-        low, high = self.element.parameter(name).bounds
-        value = self.element.absent + self._factor * (scaled[name] - self.element.absent)
-        margin = 1e-3 * abs(scaled[name])
-        scaled[name] = float(np.clip(value, low + margin if low > -math.inf else low, high))
-        return scaled
-
-    @property
-    def _factor(self) -> float:
-        """The factor on the first guess, kept away from zero and from values far beyond the scored one."""
-        factor = float(np.clip(self.size, -30.0, 30.0))
-        return math.copysign(max(abs(factor), 0.05), factor)
+        return rescaled(self.element, self.values, self.size)
 
     def own(self, model: Model, factor: float | None = None) -> dict[str, float]:
         """Values of the model's own parameters beside the first guess, times `factor` if given, within their bounds."""
         found = {}
         for name, change in self.beside.items():
             low, high = model.parameters[name].bounds
-            moved = model.value(name) + (self._factor if factor is None else factor) * change
+            moved = model.value(name) + (limited(self.size) if factor is None else factor) * change
             found[name] = float(np.clip(moved, low, high))
         return found
 

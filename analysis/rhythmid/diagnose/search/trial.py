@@ -170,15 +170,7 @@ def propose(
     def named(guess: dict[str, float]) -> dict[str, float]:
         return {f"{label}.{name}": value for name, value in guess.items()}
 
-    faint = [fainter(element, guesses[0], share) for share in FAINTER] if element.size else []
+    faint = [element.scaled(guesses[0], share) for share in FAINTER] if element.size else []
     own = [*beside, *({} for _ in guesses[len(beside) :])]
     begun = tuple(named(guess) | values for guess, values in zip(guesses, own, strict=True))
     return Proposal((*added, label), extended, begun, ceiling, tuple(map(named, faint)))
-
-
-def fainter(element: Element, guess: dict[str, float], share: float) -> dict[str, float]:
-    """Values of an element's parameters with its effect scaled to a share."""
-    value = guess[element.size]
-    if math.isinf(element.absent):
-        return guess | {element.size: value / share}
-    return guess | {element.size: element.absent + share * (value - element.absent)}
