@@ -152,10 +152,11 @@ class Rows:
         both = float(x @ drive)
         return both < 0.0 and 1.0 - both**2 / (float(x @ x) * float(drive @ drive)) < FED_BACK
 
-    def fit(self, names: Sequence[str], delay: float = 0.0, followed: str = "") -> Law:
+    def fit(self, names: Sequence[str], delay: float = 0.0, followed: str = "", moving: bool = False) -> Law:
         """Force balance of these columns; coefficients of acceleration, velocity and position are nonnegative.
 
         The coefficient of the column that is `followed` is one, beside those of `names`: the driving signal is a reference.
+        `moving` leaves out the rows at rest, at which dry friction balances any driving signal up to its size.
         """
         places = [COLUMNS.index(name) for name in names]
         every = max(1, sum(map(len, self.drives)) // MOST_ROWS)
@@ -168,6 +169,10 @@ class Rows:
             sides.append(drive[rows - step])
             kept.append(columns[rows])
         drives, columns = np.concatenate(sides), np.vstack(kept)
+        if moving:
+            speed = np.abs(columns[:, COLUMNS.index("velocity")])
+            moves = speed > SLOW * float(np.quantile(speed, 0.95))
+            drives, columns = drives[moves], columns[moves]
         side = drives - columns[:, COLUMNS.index(followed)] if followed else drives
         matrix = columns[:, places]
         size = np.linalg.norm(matrix, axis=0)
