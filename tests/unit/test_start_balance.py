@@ -226,3 +226,22 @@ def test_no_spring_is_guessed_where_nothing_drives_a_machine_that_never_comes_ba
     found = start([tmp_path / "run.npz"])
     assert labels(found) == {"viscous_damper"}
     assert "it gains speed until t = " in " ".join(found.lines())
+
+
+def turning(gravity: float, off_centre: float, friction: float) -> np.ndarray:
+    """Measured angle (n,) of a wheel that was spun and is left alone: gravity on it, and a sensor off its centre."""
+    angle, speed, found = 0.0, 30.0, []
+    for _ in TIME:
+        found.append(angle + off_centre * np.sin(angle))
+        speed -= foreign.STEP * (gravity * np.sin(angle) + friction * speed)
+        angle += foreign.STEP * speed
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    ("gravity", "off_centre", "named"), [(0.0, 0.03, False), (25.0, 0.0, True), (25.0, 0.02, True)]
+)
+def test_a_sensor_of_angle_that_is_off_centre_is_no_gravity(tmp_path, gravity, off_centre, named):
+    angle = turning(gravity, off_centre, 0.03 if gravity else 0.1)
+    np.savez(tmp_path / "run.npz", t=TIME, joint_angle=angle)
+    assert ("pendulum_gravity" in labels(start([tmp_path / "run.npz"]))) is named
