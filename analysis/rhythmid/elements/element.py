@@ -224,6 +224,8 @@ class Element:
     controlled: bool = False  # applies only where a controller in the command path closes the loop
     displaced_base: bool = False  # differs from another element only where the input displaces the base
     driven: bool = False  # has no effect without an actuator force, as commands and actuators
+    # (**parameters) -> names and sizes of other elements that together give the same force while the machine moves
+    moving_as: Callable[..., tuple[tuple[str, float], ...]] | None = None
     reversing: bool = False  # is told from dry friction by the way after a reversal of the motion alone
     drifts: bool = (
         False  # changes with time what the drive passes through: a gain that fades, a clock, a delay
