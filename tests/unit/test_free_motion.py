@@ -61,3 +61,23 @@ def test_a_recorded_drive_explains_a_push(value):
 def test_a_motion_that_gains_speed_again_and_again_is_not_a_push():
     growing = np.exp(0.3 * TIME) * np.cos(10.0 * TIME)
     assert freed(record(growing)) is None
+
+
+def coasting(until: float, held: float = 0.5) -> np.ndarray:
+    """Angle (n,) of a wheel that is driven from `held` [s] until a time [s] and then coasts to rest."""
+    speed = np.where(TIME < until, 20.0 * np.clip(TIME - held, 0.0, None), 0.0)
+    speed += np.where(TIME >= until, 20.0 * (until - held) * np.exp(-(TIME - until)), 0.0)
+    return np.cumsum(speed) * PERIOD
+
+
+@pytest.mark.parametrize("held", [0.0, 0.5])
+def test_an_angle_that_is_driven_and_then_coasts_is_free_from_its_largest_speed_on(held):
+    found = freed(record(coasting(1.5, held)))
+    assert found is not None and found.pushed and found.begin == pytest.approx(1.5, abs=0.1)
+    (said,) = rests_of(record(coasting(1.5, held)))
+    assert "it gains speed until t = " in said
+
+
+def test_half_a_swing_and_a_fall_are_free_from_their_first_sample_on():
+    assert freed(record(np.cos(np.pi * TIME / TIME[-1]))) is None
+    assert freed(record(4.9 * TIME**2)) is None

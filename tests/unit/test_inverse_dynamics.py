@@ -255,3 +255,24 @@ def test_a_motor_fed_with_a_voltage_is_balanced_in_volts():
     fit = fit_effort(balance, model)
     assert fit.model.value("dc_motor.torque_constant") == pytest.approx(0.5, rel=0.02)
     assert fit.model.value("viscous_damper.damping") == pytest.approx(2.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("coulomb_friction", {"force": 50.0, "transition": 0.02}),
+        ("asymmetric_coulomb_friction", {"force": 50.0, "asymmetry": 0.3, "transition": 0.02}),
+        (
+            "stribeck_friction",
+            {"force": 50.0, "static_ratio": 1.5, "stribeck_speed": 0.05, "transition": 0.02},
+        ),
+    ],
+)
+def test_the_speed_over_which_friction_turns_is_as_declared_however_light_the_mass(name, values):
+    balance = Balance.of([axis()], axis_model())
+    parts = []
+    for mass in (0.01, 1000.0):
+        without = axis_model(mass=str(mass))
+        with_it = without.with_element(CATALOGUE[name], values)
+        parts.append(balance.required(with_it)[0] - balance.required(without)[0])
+    np.testing.assert_allclose(*parts, atol=1e-6)

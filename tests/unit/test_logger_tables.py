@@ -188,3 +188,28 @@ def test_objects_of_matlab_are_refused_by_their_class_and_without_warnings(tmp_p
 def test_a_remark_behind_a_row_is_no_part_of_it(tmp_path):
     table = Table.load(write(tmp_path, [*ROWS[:50], f"{ROWS[50]} # touched, by hand", *ROWS[51:]]))
     np.testing.assert_allclose(table.column("tau"), TAU)
+
+
+@pytest.mark.parametrize(
+    ("separator", "above"), [(",", "Header Size: 7\nVersion: 2\n"), (";", ""), ("\t", "")]
+)
+def test_a_last_column_that_only_some_rows_fill_may_be_missing_in_the_others(tmp_path, separator, above):
+    rows = [row.replace(",", separator) for row in ROWS]
+    rows[0] += separator + "DAQ Start"
+    rows[-1] += separator + "DAQ Pause" + separator + "DAQ Stop"
+    path = write(tmp_path, rows, above + separator.join(("t", "q", "tau", "Events")) + "\n", name="run.txt")
+    table = Table.load(path)
+    np.testing.assert_allclose(table.column("q"), Q)
+    np.testing.assert_allclose(table.column("tau"), TAU)
+
+
+def test_a_heading_that_no_row_fills_names_no_columns(tmp_path):
+    with pytest.raises(InputError, match="line 1 has 4 columns, the rows have 3"):
+        Table.load(write(tmp_path, ROWS, "t,q,tau,Events\n")).column("q")
+
+
+def test_a_row_of_more_numbers_than_its_heading_is_no_row(tmp_path):
+    rows = [*ROWS, "1.2,0.5,0.1,0.3,0.4"]
+    rows[0] += ",DAQ Start"
+    with pytest.raises(InputError, match="has 5 cells"):
+        Table.load(write(tmp_path, rows, "t,q,tau,Events\n")).column("q")

@@ -5,7 +5,7 @@ import pytest
 
 from machines import CATALOGUE
 from rhythmid.diagnose.search.restoring_force import is_restored, restoring_force
-from rhythmid.elements.candidates import ONE_WAY, candidates
+from rhythmid.elements.candidates import NEVER_REVERSED, ONE_WAY, candidates
 from rhythmid.identify.descent import WHITE
 from rhythmid.identify.output_error import start_only
 from rhythmid.identify.record_scales import scales
@@ -62,3 +62,12 @@ def test_no_spring_is_proposed_where_a_force_depends_on_the_position(element, va
     held = free().with_element(CATALOGUE[element], values)
     series = turning(np.sin(6.0 * TIME))
     assert is_restored(start_only(held, [series], WHITE, 5e-3)) and proposed(held, series) == []
+
+
+def test_a_motion_that_never_comes_back_shows_no_way_before_sliding():
+    """Without reversals hysteresis is a spring from wherever the record begins."""
+    hysteresis = ("elastoplastic_hysteresis", "bouc_wen_hysteresis")
+    for speed, shown in ((np.exp(-TIME), False), (np.sin(6.0 * TIME), True)):
+        found = candidates(CATALOGUE, free().setting, scales([turning(speed)], free()))
+        assert all((found.not_tried.get(name) == NEVER_REVERSED) is not shown for name in hysteresis)
+        assert any(element.name == "coulomb_friction" for element, _ in found.tried)

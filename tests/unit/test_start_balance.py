@@ -198,3 +198,50 @@ def test_a_spring_is_guessed_only_where_dry_friction_does_not_explain_it(tmp_pat
     acceleration = np.gradient(speed, foreign.STEP)
     drive = 0.05 * acceleration + 0.1 * speed + stiffness * position + 1.0 * np.sign(speed)
     assert ("linear_spring" in labels(begun(tmp_path, drive, position))) is bool(stiffness)
+
+
+def test_dry_friction_of_one_direction_is_no_constant_force_of_the_nominal_model(tmp_path):
+    force = np.where(TIME % 3.0 >= 1.0, 2.0 + np.sin(2.0 * TIME), 0.3)  # it rests in between, held by 0.6
+    speed = moved(force, 0.05, 0.2, 0.0, 0.6)[1]
+    assert speed.min() > -1e-3
+    np.savez(tmp_path / "run.npz", t=TIME, wheel_speed=speed, motor_torque=force)
+    found = start([tmp_path / "run.npz"])
+    assert labels(found) == {"viscous_damper"}
+    assert found.nominal.model.value("inertia.mass") == pytest.approx(0.05, rel=0.3)
+    assert found.nominal.model.value("viscous_damper.damping") == pytest.approx(0.2, rel=0.3)
+    (remark,) = found.nominal.remarks
+    assert "against the motion is needed for the balance" in remark
+
+
+def test_a_weight_that_is_moved_up_and_down_is_a_constant_force_of_the_nominal_model(tmp_path):
+    force = 3.0 * np.sin(2.0 * TIME)
+    found = begun(tmp_path, force + 5.0, moved(force, 0.05, 0.3, 0.0, 0.2)[0])
+    assert "constant_force" in labels(found)
+    assert found.nominal.model.value("constant_force.force") == pytest.approx(-5.0, rel=0.1)
+
+
+def test_no_spring_is_guessed_where_nothing_drives_a_machine_that_never_comes_back(tmp_path):
+    speed = np.where(TIME < 1.0, 20.0 * TIME, 20.0 * np.exp(-0.4 * (TIME - 1.0)))
+    np.savez(tmp_path / "run.npz", t=TIME, position=np.cumsum(speed) * foreign.STEP)
+    found = start([tmp_path / "run.npz"])
+    assert labels(found) == {"viscous_damper"}
+    assert "it gains speed until t = " in " ".join(found.lines())
+
+
+def turning(gravity: float, off_centre: float, friction: float) -> np.ndarray:
+    """Measured angle (n,) of a wheel that was spun and is left alone: gravity on it, and a sensor off its centre."""
+    angle, speed, found = 0.0, 30.0, []
+    for _ in TIME:
+        found.append(angle + off_centre * np.sin(angle))
+        speed -= foreign.STEP * (gravity * np.sin(angle) + friction * speed)
+        angle += foreign.STEP * speed
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    ("gravity", "off_centre", "named"), [(0.0, 0.03, False), (25.0, 0.0, True), (25.0, 0.02, True)]
+)
+def test_a_sensor_of_angle_that_is_off_centre_is_no_gravity(tmp_path, gravity, off_centre, named):
+    angle = turning(gravity, off_centre, 0.03 if gravity else 0.1)
+    np.savez(tmp_path / "run.npz", t=TIME, joint_angle=angle)
+    assert ("pendulum_gravity" in labels(start([tmp_path / "run.npz"]))) is named

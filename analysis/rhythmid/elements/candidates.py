@@ -10,6 +10,9 @@ from rhythmid.elements.first_guess import NoGuess
 
 STIFFNESS = "stiffness"  # the family of the forces that bring a position back
 IDLE = "no command, forcing or controller drives the machine"
+# along such a motion the way before sliding is a spring from wherever the record begins, and with a state of its own in each
+# window a constant force of each
+NEVER_REVERSED = "the motion never comes back, and without reversals nothing but the first way shows what it does before it slides"
 STEADY = "the drive changes only once in each record, which does not show that its effect changes with time"
 ONE_WAY = "nothing in the model restores the position, and the motion never comes back, so that a force of the position is not told from one of the speed or the time"
 LEVEL = "the drive never changes within a record, which shows no delay, lag or memory on its way"
@@ -100,6 +103,8 @@ def _unsuitable(element: Element, setting: Setting, scales: Scales) -> str | Non
     )  # what it does comes back with each turn
     if element.family == STIFFNESS and not (setting.restored or scales.comes_back or turns):
         return ONE_WAY
+    if element.reversing and not scales.comes_back:
+        return NEVER_REVERSED
     if (reason := _untold_by_levels(element, setting, scales)) is not None:
         return reason
     if element.displaced_base and not scales.displaced_base:

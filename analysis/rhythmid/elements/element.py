@@ -172,7 +172,7 @@ class Element:
     `special_case_of` names more general elements that contain this one, exactly or in a limit of their parameters.
     `confusable` maps another element's name to an experiment or property that distinguishes the two. A `rotational`
     effect needs an angle for x, a `controlled` one a controller in the model, one of a `displaced_base` an input
-    that moves the base. `ranges` limits parameters, by the record's scales, to values for which the element's name
+    that moves the base. A `reversing` one is told from dry friction by what follows a reversal of the motion alone. `ranges` limits parameters, by the record's scales, to values for which the element's name
     applies: a ripple repeats within the travel, otherwise it is only another spring. `hops` is the largest distance
     of the local minima of a fit in a parameter. `needless_with` names elements, or as "element.parameter" estimated
     parameters, beside which this element adds nothing to another candidate or to the nominal model. `against` says
@@ -224,6 +224,9 @@ class Element:
     controlled: bool = False  # applies only where a controller in the command path closes the loop
     displaced_base: bool = False  # differs from another element only where the input displaces the base
     driven: bool = False  # has no effect without an actuator force, as commands and actuators
+    # (**parameters) -> names and sizes of other elements that together give the same force while the machine moves
+    moving_as: Callable[..., tuple[tuple[str, float], ...]] | None = None
+    reversing: bool = False  # is told from dry friction by the way after a reversal of the motion alone
     drifts: bool = (
         False  # changes with time what the drive passes through: a gain that fades, a clock, a delay
     )

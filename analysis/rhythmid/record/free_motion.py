@@ -29,6 +29,9 @@ LEAST_WAY = 0.01  # least way that two passages have in common, as a share of th
 # changes it by a tenth
 GAIN = 1.25
 LEAST_GAIN = 0.01  # least increase of the squared speed, as a share of its largest: less is noise
+# least ratio of the time in which a motion of one direction loses speed to that in which it gained it, for a push: a machine
+# that swings to the other side takes as long for either
+COASTING = 2.0
 LEAST_PASSAGES = 2  # passages without a push after the last one, so that the motion is free at all
 
 
@@ -45,7 +48,9 @@ class Freed:
 def freed(record: Record) -> Freed | None:
     """Where a motion becomes free that nothing recorded drives at first; None where it is free or driven from its start.
 
-    After a push it is taken from its fastest point on: a hand may still lead it up to there.
+    After a push it is taken from its fastest point on: a hand may still lead it up to there. A motion of one direction that gains
+    speed and loses it for much longer counts as pushed: a release through which it comes to rest on the same side is nearly as free
+    from its fastest point on.
     """
     if record.output_kind == "acceleration" or len(record.output) < 4 * FIRST:
         return None
@@ -61,13 +66,12 @@ def freed(record: Record) -> Freed | None:
     if last is not None and not _drives(record, float(time[-1])):
         after = strokes[last + 1]
         return Freed(_fastest(time, speed, after), float(time[after.start]), True)
-    if rest is None:
-        return None
     away = strokes[0] if len(strokes) else slice(0, len(time))
-    if record.output_kind == "velocity" and not _turns(speed):  # nothing tells a push from a release
-        begin = _fastest(time, speed, away)
+    unseen = record.output_kind == "velocity" and rest is not None
+    if not _turns(speed) and (unseen or (not _drives(record, float(time[-1])) and _coasts(time, speed))):
+        begin = _fastest(time, speed, away)  # nothing tells a push from a release
         return Freed(begin, begin, True)
-    return Freed(rest, rest, False)
+    return None if rest is None else Freed(rest, rest, False)
 
 
 def _rest(record: Record) -> float | None:
@@ -154,6 +158,16 @@ def _gains(position: Array, speed: Array, one: slice, other: slice) -> bool:
         squared.append(float(np.mean(np.interp(places, x[order], speed[part][order] ** 2))))
     increase = squared[1] - squared[0]
     return squared[1] > GAIN * squared[0] and increase > LEAST_GAIN * float(np.max(speed**2))
+
+
+def _coasts(time: Array, speed: Array) -> bool:
+    """Whether a motion (n,) of one direction gains speed first and then clearly loses it for much longer."""
+    squared = speed**2
+    top = int(np.argmax(squared))
+    if top == 0 or GAIN * max(squared[0], squared[-1]) > squared[top]:
+        return False
+    begin = int(np.argmax(np.abs(speed) > AT_REST * np.abs(speed[top])))
+    return float(time[-1] - time[top]) >= COASTING * float(time[top] - time[begin])
 
 
 def _fastest(time: Array, speed: Array, part: slice) -> float:

@@ -23,6 +23,7 @@ from rhythmid.record.labelled_rows import labels_of, read_labelled
 from rhythmid.record.list_cells import list_of, lists_of
 from rhythmid.record.lvm_head import lvm_head
 from rhythmid.record.measured_cells import is_measured, measured
+from rhythmid.record.optional_cells import optional_cells
 from rhythmid.record.settings_above import without_settings
 from rhythmid.record.text_cells import COMMENTS, cells_of, content, is_missing, is_number, number_of
 from rhythmid.record.text_file import opened
@@ -97,8 +98,12 @@ def table_of(
     if begin is None:
         lines = list(lines)
         begin = list(islice(unbroken(lines), LOOKED_AT))
+    optional = optional_cells(begin)
+    if optional is not None:
+        begin = list(optional.filled(begin))
     dialect, lvm = dialect_of(begin, name), lvm_head(begin)
-    body = islice(unbroken(lines), dialect.first, None)
+    whole = unbroken(lines)
+    body = islice(whole if optional is None else optional.filled(whole), dialect.first, None)
     rows = rows_in(body, dialect.first, dialect.separator, dialect.head)
     count = len(dialect.names)
     words = [place for place in range(count) if place not in dialect.numeric]

@@ -28,7 +28,11 @@ OF_THE_DRIVE = 0.015
 # (ω τ)⁴/4 of the power, and more with every further effect that it takes on
 OF_A_LAG = 0.5
 STEADY = 1e-9  # relative variation below which the driving signal is constant: rounding error of the filters
-COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant", "friction")
+# acceleration that a sensor of angle reads off centre, e v² sin(x − φ): once a turn as gravity is, but growing with the speed
+OFF_CENTRE = ("off_centre_sine", "off_centre_cosine")
+OF_ANGLE = ("sine", "cosine")
+LEFT_OF_A_TURN = 0.1  # least share of such a column's power within the filter: less is the end of a band, where turns are slow
+COLUMNS = ("acceleration", "velocity", "position", *OF_ANGLE, "constant", "friction", *OFF_CENTRE)
 POSITIVE = frozenset({"acceleration", "velocity", "position", "friction"})
 # share of the fast speed (its 95 % quantile) within which dry friction changes its sign: as for the effort balance
 SLOW = 0.03
@@ -57,7 +61,7 @@ class Law:
 class Rows:
     """The driving signal and the columns of the balance for all stretches, low-pass filtered.
 
-    `drives` (n,) and `columns` (n, 7) belong to each stretch, in the order of COLUMNS. `period` [s] is the sample
+    `drives` (n,) and `columns` (n, 9) belong to each stretch, in the order of COLUMNS. `period` [s] is the sample
     period of the filtered motion, `margin` the number of samples at either end that are affected by the filter.
     `latest` [s] is the longest delay of the driving signal. `span` is the travel of the position, relative to a moving base.
     Where the base drives the machine (`by_base`), the driving signal is −a.
@@ -152,10 +156,11 @@ class Rows:
         both = float(x @ drive)
         return both < 0.0 and 1.0 - both**2 / (float(x @ x) * float(drive @ drive)) < FED_BACK
 
-    def fit(self, names: Sequence[str], delay: float = 0.0, followed: str = "") -> Law:
+    def fit(self, names: Sequence[str], delay: float = 0.0, followed: str = "", moving: bool = False) -> Law:
         """Force balance of these columns; coefficients of acceleration, velocity and position are nonnegative.
 
         The coefficient of the column that is `followed` is one, beside those of `names`: the driving signal is a reference.
+        `moving` leaves out the rows at rest, at which dry friction balances any driving signal up to its size.
         """
         places = [COLUMNS.index(name) for name in names]
         every = max(1, sum(map(len, self.drives)) // MOST_ROWS)
@@ -168,6 +173,10 @@ class Rows:
             sides.append(drive[rows - step])
             kept.append(columns[rows])
         drives, columns = np.concatenate(sides), np.vstack(kept)
+        if moving:
+            speed = np.abs(columns[:, COLUMNS.index("velocity")])
+            moves = speed > SLOW * float(np.quantile(speed, 0.95))
+            drives, columns = drives[moves], columns[moves]
         side = drives - columns[:, COLUMNS.index(followed)] if followed else drives
         matrix = columns[:, places]
         size = np.linalg.norm(matrix, axis=0)
@@ -185,13 +194,20 @@ class Rows:
 
 
 def _filtered(one: Motion, bandwidth: Bandwidth, slow: float) -> Array:
-    """The driving signal and all columns (n, 8) below the effort's bandwidth; friction changes its sign within the
+    """The driving signal and all columns (n, 10) below the effort's bandwidth; friction changes its sign within the
     speed `slow`."""
     x, v = one.leg_position, one.leg_velocity
     friction = np.tanh(v / slow) if slow > 0.0 else np.zeros(len(v))
     level = np.ones(len(x))
-    both = np.column_stack([one.effort, one.acceleration, v, x, np.sin(x), np.cos(x), level, friction])
+    sine, cosine = np.sin(x), np.cos(x)
+    both = np.column_stack(
+        [one.effort, one.acceleration, v, x, sine, cosine, level, friction, v**2 * sine, v**2 * cosine]
+    )
+    whole = np.var(both, axis=0)
     both = high_pass(low_pass(both, one.period, bandwidth.effort), one.period, bandwidth.low)
+    turned = [1 + COLUMNS.index(name) for name in (*OF_ANGLE, *OFF_CENTRE)]
+    # in turns too fast for the filter, what it leaves of a sine is no force of the angle but follows the speed
+    both[:, [place for place in turned if np.var(both[:, place]) < LEFT_OF_A_TURN * whole[place]]] = 0.0
     if bandwidth.low > 0.0:
         # the remainder of a constant after the filter contains no information
         both[:, 1 + COLUMNS.index("constant")] = 0.0

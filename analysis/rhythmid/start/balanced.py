@@ -9,7 +9,7 @@ from rhythmid.elements.force.pendulum_gravity import LEAST_SWING
 from rhythmid.errors import InputError
 from rhythmid.model import MASS, Model
 from rhythmid.record.record import Record
-from rhythmid.start.balance import LATEST_ACTION, Law, Rows
+from rhythmid.start.balance import LATEST_ACTION, OFF_CENTRE, Law, Rows
 from rhythmid.start.correction import Correction
 from rhythmid.units import Units
 from rhythmid.value import Value
@@ -117,9 +117,11 @@ def _reversed(records: Sequence[Record], rows: Rows, law: Law, rotary: bool) -> 
 def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
     """The balance with the restoring force, if there is one: a spring, or gravity of a pendulum.
 
-    The integral of a speed drifts. Gravity depends on the absolute angle, which the integral does not give; a
-    spring is identifiable from it only where the motion returns. Either has to explain clearly more even beside dry
-    friction, which every machine may have and whose effect a spring partly absorbs.
+    The integral of a speed drifts. In full turns gravity has to explain clearly more even beside a sensor that is off centre. Gravity depends on the absolute angle, which the integral does not give; a
+    spring is identifiable from it only where the motion returns, and so it is where nothing drives the machine: along a motion of
+    one direction it is told neither from damping nor from a push. Each force has to explain clearly more even beside dry
+    friction, which every machine may have: a spring partly absorbs it, and in a motion of one direction a constant is the same,
+    but would move the machine where it rests. Where friction is the better of the two, it is in the law and no kind of its own.
     """
     measured = all(record.output_kind == "position" for record in records)
     moving = ["acceleration", "velocity"] if inertial else ["velocity"]
@@ -133,15 +135,25 @@ def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: boo
     }
     if rotary and measured and rows.span >= 2.0 * LEAST_SWING:
         options["pendulum"] = rows.fit([*moving, "sine", *(["cosine"] if level else [])], delay)
-    if options["spring"].coefficients["position"] <= 0.0 or not (measured or rows.comes_back):
+    driven = any(one.input is not None or one.effort is not None for one in records)
+    if "pendulum" in options and rows.span >= 2.0 * math.pi:
+        off, both = (
+            rows.fit([*one.coefficients, *OFF_CENTRE], delay) for one in (plain, options["pendulum"])
+        )
+        if not both.earns_place(off):
+            del options["pendulum"]
+    if options["spring"].coefficients["position"] <= 0.0 or not ((measured and driven) or rows.comes_back):
         del options["spring"]
     law, kind = plain, "free"
     if options["constant"].earns_place(law):
-        law, kind = options["constant"], "constant"
+        against, both = (rows.fit([*moving, *more, "friction"], delay, moving=True) for more in ((), level))
+        law, kind = (options["constant"], "constant") if both.earns_place(against) else (against, "free")
     back = [name for name in ("spring", "pendulum") if name in options]
     if back:
         best = min(back, key=lambda name: options[name].left)
-        dry = [rows.fit([*one.coefficients, "friction"], delay) for one in (options[best], law)]
+        dry = [
+            rows.fit([*dict.fromkeys([*one.coefficients, "friction"])], delay) for one in (options[best], law)
+        ]
         if options[best].earns_place(law) and dry[0].earns_place(dry[1]):
             law, kind = options[best], best
     return law, kind

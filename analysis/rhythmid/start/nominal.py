@@ -105,6 +105,7 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
         reasons["input_delay"] = "the balance is better when what drives acts so much later"
         doubts |= _doubt_of_delay(law.delay, few)
     model, more = _forces(model, law, kind, rows, catalogue)
+    remarks += _friction(law, units)
     corrections = found.corrections
     if not corrections and not rows.steady:
         shifted = offset_of(records, driver, units.force, kind)
@@ -184,6 +185,17 @@ def _forces(
         why = "every machine loses energy; the balance shows no damping, so a small one is guessed"
     model = model.with_element(catalogue["viscous_damper"], {"damping": _short(damping)})
     return model, reasons | {"viscous_damper": why}
+
+
+def _friction(law: Law, units: Units) -> list[str]:
+    """A remark on dry friction that the balance needs and that the model is left without, for `diagnose` to name; none of less."""
+    force = law.coefficients.get("friction", 0.0)
+    if force <= 0.0:
+        return []
+    return [
+        f"No constant force: {force:.3g} {units.force} against the motion is needed for the balance, dry friction or a weight that it works "
+        "against. `diagnose` looks for it; put in what is known."
+    ]
 
 
 def _controller(
@@ -333,7 +345,7 @@ def _alone(records: Sequence[Record], units: Units, catalogue: Catalogue, why: s
     except InputError as error:
         return _by_size(records, units, catalogue, str(error), fixed=True)
     model, more = _forces(model, law, kind, rows, catalogue)
-    return Nominal(model, reasons | more, ())
+    return Nominal(model, reasons | more, tuple(_friction(law, units)))
 
 
 def _as_driven(record: Record) -> Record:

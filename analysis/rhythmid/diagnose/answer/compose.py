@@ -22,6 +22,7 @@ from rhythmid.diagnose.answer.result import (
     Scored,
     settled,
 )
+from rhythmid.diagnose.answer.same_while_moving import same_while_moving
 from rhythmid.diagnose.answer.wording import (
     freed_value,
     location_of,
@@ -151,6 +152,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         notes=(
             *notes,
             *own_sizes(decision, fit, result.size_errors),
+            *(said for label in decision.named for said in same_while_moving(fit.model.term(label))),
             *held_out_zero_notes(
                 fit, result.scoring.unseen if case.holdout and not case.budget.spent else ()
             ),

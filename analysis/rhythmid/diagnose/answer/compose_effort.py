@@ -13,6 +13,7 @@ from rhythmid.diagnose.answer.result import (
     Scored,
     settled,
 )
+from rhythmid.diagnose.answer.same_while_moving import same_while_moving
 from rhythmid.diagnose.answer.varied_motion import motion_varying
 from rhythmid.diagnose.answer.wording import (
     NOT_LOCATED,
@@ -91,7 +92,11 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         ),
         excluded=tuple(Untried(name, why) for name, why in result.search.not_tried.items()),
         heldout=held,
-        notes=(*notes, *separate_zeros_notes((*case.records[:1], *case.holdout))),
+        notes=(
+            *notes,
+            *separate_zeros_notes((*case.records[:1], *case.holdout)),
+            *(said for label in decision.named for said in same_while_moving(chosen.fit.model.term(label))),
+        ),
     )
 
 

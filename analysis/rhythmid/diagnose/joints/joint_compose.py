@@ -8,6 +8,7 @@ from rhythmid.body.inertial_parameter import split
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.compose_effort import FIXED_SCALE
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
+from rhythmid.diagnose.answer.same_while_moving import same_while_moving
 from rhythmid.diagnose.constants import BLIND, STATED
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.joints.base_tilt import BaseTilt
@@ -118,7 +119,14 @@ def compose_machine(
         not_judged=dict(refused),
         families={joint: one.families for joint, one in answers.items() if one.families},
         assumptions=assumptions_of(machine, found, answers),
-        notes=tuple(notes),
+        notes=(
+            *notes,
+            *(
+                said
+                for joint, label in open_
+                for said in same_while_moving(found[joint].result.chosen.fit.model.term(label), f"{joint}.")
+            ),
+        ),
         reference_delay=delay,
     )
 

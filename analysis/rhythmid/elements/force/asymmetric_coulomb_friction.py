@@ -40,6 +40,10 @@ ELEMENT = Element(
     ],
     ranges=lambda s: {"transition": s.turning, "asymmetry": ONE_SIDED},
     beyond=("constant_force", "coulomb_friction"),
+    moving_as=lambda force, asymmetry, **_: (
+        ("coulomb_friction", force),
+        ("constant_force", -force * asymmetry),
+    ),
     against="base",
     also_known_as=("direction-dependent dry friction",),
     family="friction",

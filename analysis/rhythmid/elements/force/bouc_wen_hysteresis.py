@@ -41,6 +41,7 @@ ELEMENT = Element(
     # difference from a spring is 7 % of its mean square at the end of this range, 1.5 % at twice that)
     ranges=lambda s: {"yield_displacement": (0.0, 0.5 * (s.high - s.low))},
     against="base",
+    reversing=True,
     also_known_as=("smooth hysteresis", "Dahl friction", "presliding friction"),
     family="friction",
     confusable={

@@ -38,6 +38,7 @@ ELEMENT = Element(
     # difference from a spring is 3 % of its mean square at the end of this range, 0.2 % at twice that)
     ranges=lambda s: {"yield_displacement": (0.0, 0.5 * (s.high - s.low))},
     against="base",
+    reversing=True,
     also_known_as=(
         "Jenkins element",
         "Iwan element",

@@ -358,8 +358,9 @@ class Balance:
     ) -> Array:  # fmt: skip
         values = term.numbers
         of_leg = term.element.acts not in ("body", "drive")
-        # the filtered motion moves states smoothly; elements without states take the simulator's step
-        step = max(MAX_STEP, motion.period / SUBSTEPS) if term.element.states else MAX_STEP
+        # the filtered motion moves states smoothly. Elements without states are not integrated: what they widen for the step of
+        # a simulation stays as declared. Widened, the transition of friction on a light mass would depend on that mass
+        step = max(MAX_STEP, motion.period / SUBSTEPS) if term.element.states else 0.0
         path = motion.path(effort, leg, signal, of_leg)
         if load is not None:
             path = replace(path, load=load)
