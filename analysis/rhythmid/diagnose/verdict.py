@@ -223,21 +223,16 @@ def decide(
     if chosen.kind == "delay" and chosen.effects:  # a delay beside effects is reported with the delays
         labels = tuple(label for label in labels if label != INPUT_DELAY)
     lost = left.expected + lost_share(contest, chosen)
-    family = {label: chosen.family.get(names[label], "") for label in labels}
-    alone = {
-        label: chance_of_law(shares[label], lost, size_errors.get(label, 0.0), family[label])
-        for label in labels
-    }
-    open_ = [label for label in labels if alone[label] < STATED]
-    sure = {
-        label: chance_of_law(
-            shares[label],
-            lost + removed_by([one for one in open_ if names[one] != names[label]], chosen, contest),
-            size_errors.get(label, 0.0),
-            family[label],
+
+    def chance(label: str, beside: Sequence[str]) -> float:
+        """Chance that an effect is the law that its name says, where the effects `beside` are laws that are unlikely to be true."""
+        others = lost + removed_by(beside, chosen, contest)
+        return chance_of_law(
+            shares[label], others, size_errors.get(label, 0.0), chosen.family.get(names[label], "")
         )
-        for label in labels
-    }
+
+    open_ = [label for label in labels if chance(label, ()) < STATED]
+    sure = {label: chance(label, [one for one in open_ if names[one] != names[label]]) for label in labels}
 
     def stands_for(one: str, label: str) -> bool:
         return names[one] == names[label] and labels.index(one) <= labels.index(label)
@@ -252,48 +247,50 @@ def decide(
     stated = _stated(labels, probability)
     groups = _groups(contest, selection)
     missed = math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300)
+    important = max(contest.unnamed * contest.size, 1e-300)
     found = Outcome(
-        chosen.kind if chosen.elements else "nominal",
-        len(stated),
-        chosen.kind == "delay" and (not stated or stated == (INPUT_DELAY,)),
-        chosen.kind == "freed_value" and not (stated and stated[0] in chosen.effects),
-        left.share,
-        left.goes_with,
-        math.sqrt(left.least) / max(contest.unnamed * contest.size, 1e-300),
-        missed,
-        contest.structured * missed,
-        contest.structured_after * missed,
-        (chosen.heldout_nrmse or 0.0) / contest.follows,
-        detectable,
-        size_errors.get(labels[0], 0.0) if labels else 0.0,
-        joint_probability([names[label] for label in labels], contest, chosen, weights),
-        bool(groups),
-        contest.cut_short,
-        withheld(contest, selection) / max(contest.unnamed * contest.size, 1e-300),
-        contest.uncompared,
+        kind=chosen.kind if chosen.elements else "nominal",
+        stated=len(stated),
+        delay_alone=chosen.kind == "delay" and (not stated or stated == (INPUT_DELAY,)),
+        value_alone=chosen.kind == "freed_value" and not (stated and stated[0] in chosen.effects),
+        left=left.share,
+        goes_with=left.goes_with,
+        remainder=math.sqrt(left.least) / important,
+        missed=missed,
+        structured=contest.structured * missed,
+        lost=contest.structured_after * missed,
+        astray=(chosen.heldout_nrmse or 0.0) / contest.follows,
+        detectable=detectable,
+        vague=size_errors.get(labels[0], 0.0) if labels else 0.0,
+        evidence=joint_probability([names[label] for label in labels], contest, chosen, weights),
+        alike=bool(groups),
+        cut_short=contest.cut_short,
+        withheld=withheld(contest, selection) / important,
+        uncompared=contest.uncompared,
     )
     rule = rule_for(found)
     named = stated if rule.verdict == "missing_physics" else labels
     told = {names[label] for label in named}
+    agreed = [
+        label
+        for label in labels
+        if label in chosen.effects and joint_probability([names[label]], contest, chosen, weights) >= STATED
+    ]
+    families = families_of(contest, chosen, shares, weights, lost, open_, size_errors)
     return Decision(
-        rule.verdict,
-        rule.reason_of(found),
-        rule.name,
-        named,
-        shares,
-        each,
-        probability(stated or labels),
-        weights,
-        tuple(group for group in groups if group[0] in told),
-        left,
-        tuple(names[label] for label in labels if label not in named and label in chosen.effects),
-        families_of(contest, chosen, shares, weights, lost, open_, size_errors) if rule.tells_family else (),
-        tuple(
-            label
-            for label in labels
-            if label in chosen.effects
-            and joint_probability([names[label]], contest, chosen, weights) >= STATED
-        ),
+        verdict=rule.verdict,
+        reason=rule.reason_of(found),
+        rule=rule.name,
+        named=named,
+        shares=shares,
+        probability=each,
+        joint=probability(stated or labels),
+        weights=weights,
+        equivalent=tuple(group for group in groups if group[0] in told),
+        unexplained=left,
+        beside=tuple(names[label] for label in labels if label not in named and label in chosen.effects),
+        families=families if rule.tells_family else (),
+        agreed=tuple(agreed),
     )
 
 
