@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from scipy.stats import t as student
 
@@ -225,21 +226,22 @@ def decide(
     if chosen.kind == "delay" and chosen.effects:  # a delay beside effects is reported with the delays
         labels = tuple(label for label in labels if label != INPUT_DELAY)
     lost = left.expected + lost_share(contest, chosen)
-    family = {label: chosen.family.get(names[label], "") for label in labels}
-    alone = {
-        label: chance_of_law(shares[label], lost, size_errors.get(label, 0.0), family[label])
-        for label in labels
-    }
+
+    def chance(label: str, left: float) -> float:
+        """Chance that an effect is the law that its name says, where so much of the mismatch is left."""
+        family = chosen.family.get(names[label], "")
+        return chance_of_law(shares[label], left, size_errors.get(label, 0.0), family)
+
     in_place = {
-        label: (doubt(alone[label], family[label]), removed_by(label, chosen, contest)) for label in labels
+        label: (
+            doubt(chance(label, lost), chosen.family.get(names[label], "")),
+            removed_by(label, chosen, contest),
+        )
+        for label in labels
     }
     sure = {
         label: chance_beside(
-            [in_place[one] for one in labels if names[one] != names[label]],
-            lambda rest, label=label: chance_of_law(
-                shares[label], rest, size_errors.get(label, 0.0), family[label]
-            ),
-            lost,
+            [in_place[one] for one in labels if names[one] != names[label]], partial(chance, label), lost
         )
         for label in labels
     }
@@ -257,50 +259,50 @@ def decide(
     stated = _stated(labels, probability)
     groups = _groups(contest, selection)
     missed = math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300)
+    important = max(contest.unnamed * contest.size, 1e-300)
     found = Outcome(
-        chosen.kind if chosen.elements else "nominal",
-        len(stated),
-        chosen.kind == "delay" and (not stated or stated == (INPUT_DELAY,)),
-        chosen.kind == "freed_value" and not (stated and stated[0] in chosen.effects),
-        left.share,
-        left.goes_with,
-        math.sqrt(left.least) / max(contest.unnamed * contest.size, 1e-300),
-        missed,
-        contest.structured * missed,
-        contest.structured_after * missed,
-        (chosen.heldout_nrmse or 0.0) / contest.follows,
-        detectable,
-        size_errors.get(labels[0], 0.0) if labels else 0.0,
-        joint_probability([names[label] for label in labels], contest, chosen, weights),
-        bool(groups),
-        contest.cut_short,
-        withheld(contest, selection) / max(contest.unnamed * contest.size, 1e-300),
-        contest.uncompared,
+        kind=chosen.kind if chosen.elements else "nominal",
+        stated=len(stated),
+        delay_alone=chosen.kind == "delay" and (not stated or stated == (INPUT_DELAY,)),
+        value_alone=chosen.kind == "freed_value" and not (stated and stated[0] in chosen.effects),
+        left=left.share,
+        goes_with=left.goes_with,
+        remainder=math.sqrt(left.least) / important,
+        missed=missed,
+        structured=contest.structured * missed,
+        lost=contest.structured_after * missed,
+        astray=(chosen.heldout_nrmse or 0.0) / contest.follows,
+        detectable=detectable,
+        vague=size_errors.get(labels[0], 0.0) if labels else 0.0,
+        evidence=joint_probability([names[label] for label in labels], contest, chosen, weights),
+        alike=bool(groups),
+        cut_short=contest.cut_short,
+        withheld=withheld(contest, selection) / important,
+        uncompared=contest.uncompared,
     )
     rule = rule_for(found)
     named = stated if rule.verdict == "missing_physics" else labels
     told = {names[label] for label in named}
+    agreed = [
+        label
+        for label in labels
+        if label in chosen.effects and joint_probability([names[label]], contest, chosen, weights) >= STATED
+    ]
+    families = families_of(contest, chosen, shares, weights, lost, in_place, size_errors)
     return Decision(
-        rule.verdict,
-        rule.reason_of(found),
-        rule.name,
-        named,
-        shares,
-        each,
-        probability(stated or labels),
-        weights,
-        tuple(group for group in groups if group[0] in told),
-        left,
-        tuple(names[label] for label in labels if label not in named and label in chosen.effects),
-        families_of(contest, chosen, shares, weights, lost, in_place, size_errors)
-        if rule.tells_family
-        else (),
-        tuple(
-            label
-            for label in labels
-            if label in chosen.effects
-            and joint_probability([names[label]], contest, chosen, weights) >= STATED
-        ),
+        verdict=rule.verdict,
+        reason=rule.reason_of(found),
+        rule=rule.name,
+        named=named,
+        shares=shares,
+        probability=each,
+        joint=probability(stated or labels),
+        weights=weights,
+        equivalent=tuple(group for group in groups if group[0] in told),
+        unexplained=left,
+        beside=tuple(names[label] for label in labels if label not in named and label in chosen.effects),
+        families=families if rule.tells_family else (),
+        agreed=tuple(agreed),
     )
 
 

@@ -17,6 +17,7 @@ from rhythmid.diagnose.answer.result import (
     Estimate,
     Explanation,
     FitQuality,
+    Location,
     MissingEffect,
     Remainder,
     Scored,
@@ -35,7 +36,10 @@ from rhythmid.diagnose.case import EXPLAINED, Case
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
+from rhythmid.diagnose.hypothesis import Verdict
+from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.reference_scale import scale_told
+from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.search.proposals import WORTH
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest
@@ -56,6 +60,7 @@ from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 SHOWN = 8  # alternatives listed
+VARIES = 0.2  # share of the mismatch from which a free function of a quantity is told with its location
 ONE_CLOCK = "The clocks of command and measurement agree: an offset between them counts as delay."
 MORE_TIME = "none computed in the time given; a larger --budget tells which experiment separates best"
 
@@ -125,7 +130,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
             plain.train_nrmse,
             _floor(series, [found.noise, *([repeats] if repeats is not None else [])]),
         ),
-        location=location_of(found, missing, result.before, decision.verdict),
+        location=_location(found, missing, result.before, decision.verdict),
         missing=missing,
         joint_probability=decision.joint,
         indistinguishable=groups,
@@ -161,6 +166,24 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         families=decision.families,
         assumptions=(ONE_CLOCK,) if any(one.commanded for one in series) else (),
     )
+
+
+def _location(
+    found: Search, missing: Sequence[MissingEffect], before: Sequence[Dependence], verdict: Verdict
+) -> Location:
+    """Where the mismatch is; without named effects, the slot of the element that scored best."""
+    by_slot: dict[str, float] = {}
+    for one in found.rounds[0].scores:
+        by_slot[one.element.slot] = max(by_slot.get(one.element.slot, 0.0), one.statistic)
+    ranked = sorted(by_slot.items(), key=lambda pair: -pair[1])
+    evidence = [f"best score in slot {slot}: chi2 = {value:.0f}" for slot, value in ranked]
+    evidence += [
+        f"a free function of {one.quantity} explains {100 * max(one.explained, 0.0):.0f} % of the mismatch in blocks left out"
+        for one in before
+    ]
+    shown = before and before[0].explained > VARIES
+    depends = f"; it varies with {before[0].quantity}" if shown else ""
+    return location_of(missing, verdict, "records", evidence, ranked[0][0] if ranked else None, depends)
 
 
 def _rivals(one: Trial, best: Trial, groups: Sequence[Sequence[str]]) -> bool:

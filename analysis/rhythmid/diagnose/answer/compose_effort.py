@@ -9,16 +9,15 @@ from rhythmid.diagnose.answer.result import (
     Diagnosis,
     Estimate,
     FitQuality,
-    Location,
     Scored,
     settled,
 )
 from rhythmid.diagnose.answer.same_while_moving import same_while_moving
 from rhythmid.diagnose.answer.varied_motion import motion_varying
 from rhythmid.diagnose.answer.wording import (
-    NOT_LOCATED,
     freed_value,
     listed,
+    location_of,
     longer_delay,
     recalibrated,
     summary_of,
@@ -29,7 +28,6 @@ from rhythmid.diagnose.effort.found_delay import delay_told, found_delay
 from rhythmid.diagnose.effort.run import EffortResult
 from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.diagnose.verdict_rules import LONGER_DELAY
-from rhythmid.elements.places import SENTENCES
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import variation_of
 from rhythmid.record.separate_zeros import separate_zeros_notes
@@ -51,18 +49,10 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     freed = freed_value(case.nominal, chosen.fit.model, result.selection.chosen) or longer_delay(
         late.value, late.std, decision
     )
-    slots = list(dict.fromkeys(effect.slot for effect in missing))
-    where = "; and ".join(SENTENCES[slot] for slot in slots) or (
-        "nowhere: the refitted nominal model explains the effort"
-        if decision.verdict == "consistent"
-        else NOT_LOCATED
-    )
     remainder = remainder_of(decision, {one.quantity: (one.value, one.mean) for one in result.remainder})
-    if not slots and decision.verdict == "unknown_physics":
-        where = SENTENCES["force"]
-        slots = ["force"]
-        if remainder.goes_with is not None:
-            where += f"; it depends on {remainder.goes_with}"
+    unknown = decision.verdict == "unknown_physics"
+    depends = f"; it depends on {remainder.goes_with}" if unknown and remainder.goes_with is not None else ""
+    slot, evidence = "force" if unknown else None, (result.applicability.reason,)
     # held-out records without an effort cannot judge a hypothesis
     unseen = result.heldout is not None
     held = held_out_words(case.holdout, "") if unseen else "held out: every block of the records in its turn"
@@ -70,7 +60,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         verdict=decision.verdict,
         summary=summary_of(decision, missing, before, after, "effort", freed, noise_known=False),
         detection=Detection(None, None, before.train_nrmse, after.train_nrmse),
-        location=Location(slots[0] if slots else None, where, (result.applicability.reason,)),
+        location=location_of(missing, decision.verdict, "effort", evidence, slot, depends),
         missing=missing,
         joint_probability=decision.joint,
         indistinguishable=decision.equivalent,

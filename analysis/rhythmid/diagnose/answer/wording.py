@@ -8,8 +8,6 @@ from rhythmid.body.body import BODY
 from rhythmid.diagnose.answer.result import FitQuality, Location, MissingEffect
 from rhythmid.diagnose.constants import CONTRADICTS, CONTRADICTS_LEAST, STATED
 from rhythmid.diagnose.hypothesis import Hypothesis, Verdict
-from rhythmid.diagnose.location import Dependence
-from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.diagnose.verdict_rules import LONGER_DELAY
 from rhythmid.elements.places import SENTENCES
@@ -21,31 +19,23 @@ NOT_LOCATED = "not located"
 
 
 def location_of(
-    found: Search, missing: Sequence[MissingEffect], before: Sequence[Dependence], verdict: Verdict
+    missing: Sequence[MissingEffect],
+    verdict: Verdict,
+    whole: str,
+    evidence: Sequence[str],
+    slot: str | None,
+    depends: str = "",
 ) -> Location:
-    by_slot: dict[str, float] = {}
-    for one in found.rounds[0].scores:
-        by_slot[one.element.slot] = max(by_slot.get(one.element.slot, 0.0), one.statistic)
-    evidence = [
-        f"best score in slot {slot}: chi2 = {value:.0f}"
-        for slot, value in sorted(by_slot.items(), key=lambda x: -x[1])
-    ]
-    evidence += [
-        f"a free function of {d.quantity} explains {100 * max(d.explained, 0.0):.0f} % of the mismatch in blocks left out"
-        for d in before
-    ]
+    """Where the named effects act; without any, the likeliest `slot`, and what the mismatch `depends` on.
+
+    `whole` is what the nominal model explains where nothing is missing.
+    """
+    slots = list(dict.fromkeys(effect.slot for effect in missing))
+    if slots:
+        return Location(slots[0], "; and ".join(SENTENCES[one] for one in slots), tuple(evidence))
     if verdict == "consistent":
-        return Location(None, "nowhere: the refitted nominal model explains the records", tuple(evidence))
-    if missing:
-        slots = list(dict.fromkeys(effect.slot for effect in missing))
-        where = "; and ".join(SENTENCES[slot] for slot in slots)
-        return Location(slots[0], where, tuple(evidence))
-    best = max(by_slot, key=lambda slot: by_slot[slot], default=None)
-    top = before[0] if before else None
-    where = SENTENCES.get(best or "", NOT_LOCATED)
-    if top is not None and top.explained > 0.2:
-        where += f"; it varies with {top.quantity}"
-    return Location(best, where, tuple(evidence))
+        return Location(None, f"nowhere: the refitted nominal model explains the {whole}", tuple(evidence))
+    return Location(slot, SENTENCES.get(slot or "", NOT_LOCATED) + depends, tuple(evidence))
 
 
 def _begun(words: str) -> str:
