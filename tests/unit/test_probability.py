@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from contests import contest, decided, predicted, supposed
 from hypothesis import given, settings
@@ -16,6 +17,7 @@ from rhythmid.diagnose.probability import (
     weights_of,
 )
 from rhythmid.diagnose.selection import select
+from rhythmid.diagnose.verdict import Decision
 
 NOMINAL = supposed("", predicted(1.0))
 SHARES = st.floats(0.0, 1.0)
@@ -110,3 +112,26 @@ def test_no_probability_leaves_zero_to_one_and_none_of_the_names_tops_its_weight
     _, decision = decided(contest(NOMINAL, supposed("a", predicted(0.1)), supposed("b", predicted(0.11))))
     for label, value in decision.probability.items():
         assert 0.0 <= value <= decision.weights[(label,)] + 1e-12
+
+
+def beside_a_ripple(floor: float) -> Decision:
+    """A cubic spring and a ripple, of which a free map leaves only `floor`."""
+    made = contest(
+        NOMINAL,
+        supposed("cubic", predicted(0.09, 500.0)),
+        supposed("cubic ripple", predicted(0.03, 900.0)),
+        maps={"position": predicted(floor, 900.0 + 2e4 * (0.03 - floor))},
+    )
+    return decided(made)[1]
+
+
+@pytest.mark.parametrize(("floor", "expected"), [(0.03, "missing_physics"), (0.001, "undecided")])
+def test_what_effects_remove_that_are_hardly_true_counts_as_unexplained(floor, expected):
+    # where a free map explains more beside it, the ripple is no law, so that the cubic spring leaves what it removes, too
+    assert beside_a_ripple(floor).verdict == expected
+
+
+def test_an_effect_is_as_doubtful_as_what_stands_beside_it_without_a_threshold():
+    cubic = [beside_a_ripple(floor).probability["cubic"] for floor in np.linspace(0.001, 0.03, 30)]
+    assert np.all(np.diff(cubic) > 0.0)
+    assert np.max(np.diff(cubic)) < 0.05

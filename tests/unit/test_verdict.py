@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from contests import (
     BLOCKS,
@@ -23,7 +22,6 @@ from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
 from rhythmid.diagnose.answer.wording import summary_of
 from rhythmid.diagnose.constants import FOLLOWS, HOLDS, RICHER
 from rhythmid.diagnose.rejections import RULES
-from rhythmid.diagnose.verdict import Decision
 
 # what is missing
 
@@ -278,29 +276,6 @@ def test_a_second_name_that_is_open_does_not_take_the_first_one_with_it():
     assert decision.joint >= 0.8
     assert all(decision.probability[label] < 0.8 for label in ("a", "b") if label in decision.probability)
     assert decision.equivalent == ()  # that a and b are not separated says nothing of friction
-
-
-def beside_a_ripple(floor: float) -> Decision:
-    """A cubic spring and a ripple, of which a free map leaves only `floor`."""
-    made = contest(
-        NOMINAL,
-        supposed("cubic", predicted(0.09, 500.0)),
-        supposed("cubic ripple", predicted(0.03, 900.0)),
-        maps={"position": predicted(floor, 900.0 + 2e4 * (0.03 - floor))},
-    )
-    return decided(made)[1]
-
-
-@pytest.mark.parametrize(("floor", "expected"), [(0.03, "missing_physics"), (0.001, "undecided")])
-def test_what_effects_remove_that_are_hardly_true_counts_as_unexplained(floor, expected):
-    # where a free map explains more beside it, the ripple is no law, so that the cubic spring leaves what it removes, too
-    assert beside_a_ripple(floor).verdict == expected
-
-
-def test_an_effect_is_as_doubtful_as_what_stands_beside_it_without_a_threshold():
-    cubic = [beside_a_ripple(floor).probability["cubic"] for floor in np.linspace(0.001, 0.03, 30)]
-    assert np.all(np.diff(cubic) > 0.0)
-    assert np.max(np.diff(cubic)) < 0.05
 
 
 @pytest.mark.parametrize(("second", "stated"), [("ripple", True), ("cubic", False)])

@@ -1,8 +1,8 @@
 """The effort balance: the effort that the motor must have given along the measured motion, if the model were correct.
 
-u = m a − ΣF, with every element's force F and its states computed along the measured motion. The recorded effort is
-only the quantity to predict; it is never a regressor. Forces under load and the actuator use the effort that the
-model itself requires. One zero-phase filter acts on the recorded effort and on everything that is compared with it.
+u = m a − ΣF, with every element's force F and its states computed along the measured motion. The recorded effort is only the quantity
+to predict; it is never a regressor. Forces under load and the actuator use the effort that the model itself requires. One zero-phase
+filter acts on the recorded effort and on everything that is compared with it.
 """
 
 import math
@@ -19,13 +19,7 @@ from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.balance_rows import sampled, stuck
 from rhythmid.identify.inverse_dynamics.bandwidth import QUARTER, Bandwidth, bridged
 from rhythmid.identify.inverse_dynamics.inversion import Inversions
-from rhythmid.identify.inverse_dynamics.motion import (
-    Motion,
-    high_pass,
-    low_pass,
-    motion_of,
-    stretches,
-)
+from rhythmid.identify.inverse_dynamics.motion import Motion, high_pass, low_pass, motion_of, stretches
 from rhythmid.identify.inverse_dynamics.reference_path import changed_by
 from rhythmid.identify.inverse_dynamics.rest_force import Rests
 from rhythmid.model import INERTIA, Model, Term
