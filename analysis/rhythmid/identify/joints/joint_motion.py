@@ -114,7 +114,7 @@ class JointBalances:
         bandwidths = (
             alike.bandwidths
             if alike
-            else {joint: _bandwidth(motions[joint], cut, dominant) for joint in machine.joints}
+            else {joint: bandwidth_below(motions[joint], cut, dominant) for joint in machine.joints}
         )
         computed = tuple(joint for joint in machine.joints if joint in stretches[0].reference)
         made = cls(
@@ -377,11 +377,3 @@ def _reference(machine: Machine, joint: str, body: BodyMotion) -> Reference:
 def _decimated(body: BodyMotion, signal: Array) -> Array:
     """A signal at a stretch's samples, decimated to the motion's samples."""
     return low_pass(signal, body.stretch.period, 1.0 / (FINER * body.period))[:: body.every]
-
-
-def _bandwidth(motions: Sequence[Motion], cut: float, dominant: float) -> Bandwidth:
-    """The bandwidth of a joint's effort, given the force that the rest of the body requires."""
-    own = [
-        replace(one, effort=one.effort - (0.0 if one.coupling is None else one.coupling)) for one in motions
-    ]
-    return bandwidth_below(own, cut, dominant)
