@@ -218,7 +218,7 @@ def _explained(
     weighed: Machine | None = (
         None  # the machine whose shared causes have been compared with the laws of its joints
     )
-    while len(links) < most and len(balances.refuted) < most and budget.allows(correction, WEIGHED):
+    while max(len(links), len(balances.refuted_links)) < most and budget.allows(correction, WEIGHED):
         told = _values_of_links(found, set(links))
         again = list(found)
         shared = None
@@ -240,7 +240,10 @@ def _explained(
         elif told:
             parameter, again = next(iter(told.items()))
             tell(f"{parameter} of {again[0]} is refuted by the joints that it moves")
-            balances = JointBalances.of(machine, records, balances.without(again[0], parameter))
+            again, link = again[:1], split(parameter)[0]
+            for name in balances.links(again[0]):  # all kinds of changes of the link have been tried
+                balances = balances.without(again[0], name) if split(name)[0] == link else balances
+            balances = JointBalances.of(machine, records, balances)
         else:
             break
         if shared is not None:

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.body.inertial_parameter import CENTRE, LOAD, MASS, MOMENT, PAYLOAD, TURNING
+from rhythmid.body.inertial_parameter import CENTRE, LOAD, MASS, MOMENT, PAYLOAD, TURNING, split
 from rhythmid.body.link_inertia import Principal, about_centre, point_mass, ten_of
 from rhythmid.body.machine import Machine
-from rhythmid.diagnose.constants import CONTRADICTS, PRACTICAL_EFFORT
+from rhythmid.diagnose.constants import CONTRADICTS, UNNAMED_EFFORT
 from rhythmid.diagnose.joints.joint_case import OF_LINKS, JointResult
 from rhythmid.diagnose.joints.link_evidence import laws_found
 from rhythmid.diagnose.joints.link_group import masses_alike
@@ -184,9 +184,12 @@ class Ranked:
 def ranked_changes(
     balances: JointBalances, records: Sequence[JointRecord], found: Mapping[str, JointResult], known: Collection[str] = ()
 ) -> list[Ranked]:  # fmt: skip
-    """All kinds of changes of all links, those that are worth most first; not those that are `known`, as "link.kind"."""
+    """All kinds of changes of all links, those that are worth most first; not of links of which a value is `known`, as "link.kind"."""
     body = balances.machine.body
-    links = [link for link in body.links if f"{link}.{LOAD}" not in known]
+    corrected = {split(parameter)[0] for parameter in known}
+    links = [link for link in body.links if link not in corrected]
+    if not links:
+        return []
     weights = {link: columns_of(balances, link) for link in links}
     options: dict[str, Options] = {}
     for joint, one in found.items():
@@ -199,8 +202,6 @@ def ranked_changes(
     for place, link in enumerate(links):
         own = {joint: one.of(slice(NUMBERS * place, NUMBERS * (place + 1))) for joint, one in options.items()}
         for kind in kinds_of(balances, link):
-            if f"{link}.{kind}" in known:
-                continue
             change = LinkChange(balances, records, link, kind, weights[link])
             beside = best_beside(own, change)
             made.append(Ranked(change, beside, beside.gain - decisive(1) * len(beside.numbers)))
@@ -253,8 +254,8 @@ def likely_link(
 ) -> WrongLink | None:  # fmt: skip
     """The change of a link that all joints together give decisively more than the laws found at each of them; None without one.
 
-    All kinds of change of the link that promises most are fitted to all joints, and the simplest that predicts best is taken. Values that are
-    `known`, as "link.kind", are corrected already. Links that are `stated` at a joint have been worth the choice among all candidates there.
+    Links are tried, the most promising first. All kinds of change of a link are fitted to all joints, and the simplest that predicts best is taken. Links with a value
+    that is `known`, as "link.kind", are corrected already. Links that are `stated` at a joint have been worth the choice among all candidates there.
     """
     ranked = ranked_changes(balances, records, found, known)
     price = max((decisive(one.result.contest.candidates) for one in found.values()), default=0.0)
@@ -264,45 +265,35 @@ def likely_link(
         return one.worth - (0.0 if one.change.link in stated else price)
 
     worthy = sorted((one for one in ranked if priced(one) > 0.0), key=lambda one: -priced(one))
-    tried: list[_Tried] = []
-    for one in worthy:
-        if one.change.link == worthy[0].change.link:
-            fit = weighed(
-                one.change,
-                balances,
-                found,
-                found,
-                one.change.start(one.beside.numbers),
-                one.beside.fits,
-                laws_found,
-            )
-            tried.append(_Tried(one.change, fit))
-    best = _simplest(tried, balances, found)
-    if best is None or not best.moved or best.worth <= (0.0 if best.change.link in stated else price):
-        return None
-    if not matters(best.change.imposed(best.fit.numbers, best.fit.paths), balances, found):
-        return None
-    own = max(one.worth for one in ranked if one.change.link == best.change.link)
-    others = [one.worth - own for one in ranked if one.change.link != best.change.link]
-    return _wrong(best, tried, others, balances, found)
+    for link in dict.fromkeys(one.change.link for one in worthy):
+        tried = [
+            _Tried(one.change, weighed(one.change, balances, found, found, one.change.start(one.beside.numbers), one.beside.fits, laws_found))
+            for one in worthy if one.change.link == link
+        ]  # fmt: skip
+        best = _simplest(tried, balances, found)
+        if not best.moved or best.worth <= (0.0 if link in stated else price):
+            continue
+        if matters(best.change.imposed(best.fit.numbers, best.fit.paths), balances, found):
+            own = max(one.worth for one in ranked if one.change.link == link)
+            others = [one.worth - own for one in ranked if one.change.link != link]
+            return _wrong(best, tried, others, balances, found)
+    return None
 
 
-def _simplest(
-    tried: Sequence[_Tried], balances: JointBalances, found: Mapping[str, JointResult]
-) -> _Tried | None:
-    """The change that is worth most, or one with fewer numbers that leaves no more of any effort, by a practical size: ten numbers also explain what
-    filters and friction laws leave."""
-    best = max(tried, key=lambda one: one.worth, default=None)
-    if best is None:
-        return None
+def _simplest(tried: Sequence[_Tried], balances: JointBalances, found: Mapping[str, JointResult]) -> _Tried:
+    """The change that is worth most. All ten numbers of a link also explain what models of real machines leave of an effort; so where they leave no less
+    than that, a change with fewer numbers is taken."""
+    best = max(tried, key=lambda one: one.worth)
+    if best.change.kind != LOAD:
+        return best
 
     def leaves_more(one: _Tried, joint: str) -> bool:
         size = variation_of(balances.balance(joint, found[joint].late))
         more = one.fit.errors[joint] ** 2 - best.fit.errors[joint] ** 2
-        return math.sqrt(max(more, 0.0)) > PRACTICAL_EFFORT * size
+        return math.sqrt(max(more, 0.0)) > UNNAMED_EFFORT * size
 
-    simpler = [one for one in tried if len(one.fit.numbers) < len(best.fit.numbers)]
-    alike = [one for one in simpler if not any(leaves_more(one, joint) for joint in found)]
+    others = [one for one in tried if one is not best]
+    alike = [one for one in others if not any(leaves_more(one, joint) for joint in found)]
     return max(alike, key=lambda one: one.worth, default=best)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from rhythmid.diagnose.constants import HOLDS, PRACTICAL_EFFORT
+from rhythmid.diagnose.constants import HOLDS, PRACTICAL_EFFORT, UNNAMED_EFFORT
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.joints.dry_friction import with_dry_friction
 from rhythmid.diagnose.joints.joint_case import PROMISING, JointResult
@@ -23,7 +23,7 @@ from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, fit_effort, variation_of
 from rhythmid.identify.joints.joint_motion import JointBalances
-from rhythmid.identify.student import autocorrelation_time
+from rhythmid.identify.student import autocorrelation_time, scale_of
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
@@ -203,22 +203,24 @@ def _gained(rows: Sequence[WeightedRows], cause: Cause) -> float:
 class Options:
     """Hypotheses of a joint, what each leaves beside any cause, as triangles (h, r, p + 1) of columns and residual, and what its effects cost (h,).
 
-    `count` is the number of independent rows.
+    `count` is the number of independent rows. `usual` is the sum of squares that models of real machines leave of such an effort.
     """
 
     fits: Sequence[Fitted]
     triangles: Array
     prices: Array
     count: float
+    usual: float
 
     def squares(self, change: Array) -> Array:
         """Sums of squares (h,) under a `change` (p,) of the coordinates."""
         left = self.triangles @ np.append(change, 1.0)
         return np.maximum(np.sum(left**2, axis=1), TINY)
 
-    def costs(self, change: Array) -> Array:
-        """Negative log likelihoods (h,) with the best size of the noise, and with the prices, under a `change` (p,) of the coordinates."""
-        return 0.5 * self.count * np.log(self.squares(change)) + self.prices
+    def costs(self, change: Array, usual: float = 0.0) -> Array:
+        """Negative log likelihoods (h,) with the best size of the noise, and with the prices, under a `change` (p,) of the coordinates, where a sum of
+        squares that is `usual` says nothing."""
+        return 0.5 * self.count * np.log(self.squares(change) + usual) + self.prices
 
     def of(self, places: slice) -> "Options":
         """The options beside these coordinates alone."""
@@ -249,14 +251,16 @@ def options_of(one: JointResult, columns: Sequence[Array]) -> Options:
         left, own = rows_of(balance, part.fit, columns, noise)
         triangles.append(np.linalg.qr(np.column_stack([own, left]), mode="r"))
     count = len(noise) / autocorrelation_time(noise, balance.record)
-    return Options(fits, np.array(triangles), price * np.array([len(part.elements) for part in fits]), count)
+    usual = count * (UNNAMED_EFFORT * variation_of(balance) / scale_of(noise)) ** 2
+    prices = price * np.array([len(part.elements) for part in fits])
+    return Options(fits, np.array(triangles), prices, count, usual)
 
 
 def best_beside(options: Mapping[str, Options], cause: Cause) -> Beside:
     """The hypothesis of each joint that is best beside the best cause, to first order.
 
     Cause and hypotheses are chosen in turn, and the joints weighted by what is then left of their efforts, from the cause that each hypothesis of one
-    effect alone gives: a law of a joint that stands for the cause would hide it.
+    effect alone gives: a law of a joint that stands for the cause would hide it. What models of real machines leave of an effort calls for no law.
     """
     slopes, spreads = cause.slopes, cause.spreads
     joints = list(options)
@@ -269,16 +273,16 @@ def best_beside(options: Mapping[str, Options], cause: Cause) -> Beside:
             total = total + options[joint].count / left * normal[joint][place]
         return np.maximum(-np.linalg.solve(total[:-1, :-1], total[:-1, -1]), cause.least)
 
-    def chosen_with(numbers: Array) -> tuple[float, dict[str, int]]:
-        costs = {joint: options[joint].costs(numbers @ slopes) for joint in joints}
-        prior = 0.5 * float(np.sum((numbers / spreads) ** 2))
-        return prior + sum(float(one.min()) for one in costs.values()), {
-            joint: int(one.argmin()) for joint, one in costs.items()
+    def chosen_with(numbers: Array, told: bool) -> tuple[float, dict[str, int]]:
+        costs = {
+            joint: one.costs(numbers @ slopes, 0.0 if told else one.usual) for joint, one in options.items()
         }
+        prior = 0.5 * float(np.sum((numbers / spreads) ** 2))
+        places = {joint: int(one.argmin()) for joint, one in costs.items()}
+        return prior + sum(float(one.min()) for one in costs.values()), places
 
     nothing = np.zeros(len(spreads))
-    without, places = chosen_with(nothing)
-    best = without, places, nothing
+    best = *chosen_with(nothing, False), nothing
     single = [
         (joint, k) for joint in joints for k, fit in enumerate(options[joint].fits) if len(fit.elements) <= 1
     ]
@@ -286,17 +290,16 @@ def best_beside(options: Mapping[str, Options], cause: Cause) -> Beside:
     for joint, place in single:
         numbers, cost = improved(nothing, {joint: place}), math.inf
         for _ in range(TURNS):
-            before, (cost, places) = cost, chosen_with(numbers)
+            before, (cost, places) = cost, chosen_with(numbers, False)
             if cost < best[0]:
                 best = cost, places, numbers
             if (key := tuple(places.values())) in seen and before - cost < SAME:
                 break
             seen.add(key)
             numbers = improved(numbers, places)
-    cost, places, numbers = best
-    return Beside(
-        {joint: options[joint].fits[place] for joint, place in places.items()}, numbers, without - cost
-    )
+    _, places, numbers = best
+    gain = chosen_with(nothing, True)[0] - chosen_with(numbers, True)[0]
+    return Beside({joint: options[joint].fits[place] for joint, place in places.items()}, numbers, gain)
 
 
 def _information(options: Options, slopes: Array) -> Array:

@@ -160,6 +160,11 @@ class JointBalances:
         """The balances in which the search at a joint does not free a parameter of a link."""
         return replace(self, refuted=self.refuted | {(joint, parameter)})
 
+    @property
+    def refuted_links(self) -> frozenset[tuple[str, str]]:
+        """Pairs of a joint and a link of which parameters are refuted there."""
+        return frozenset((joint, split(name)[0]) for joint, name in self.refuted)
+
     def links(self, joint: str) -> tuple[str, ...]:
         """Links to whose mass and inertia a joint is sensitive, as "link.mass" and "link.inertia", and those to
         whose payload it would be, as "link.payload"."""

@@ -153,7 +153,8 @@ class RecordedMotion:
         return self._shared_numbers(seen, without, weight)
 
     def loaded(self, link: str) -> tuple[Balanced, ...] | None:
-        """Effort residuals of each joint as declared where a link carries the body with which least is left of all; None where it would be lighter."""
+        """Effort residuals of each joint as declared where a link carries the body with which least is left of all; None where it would be lighter,
+        or heavier than the machine: none carries more than it weighs."""
         seen = self.seen(self.as_declared)
         if seen is None:
             return None
@@ -161,7 +162,7 @@ class RecordedMotion:
         force = self.body.inverse(*motion)
         columns = np.moveaxis(self.body.inertial_columns(link, *motion), 2, 0)
         added = self._shared_numbers(seen, force, columns)
-        if added[0] <= 0.0:
+        if not 0.0 < added[0] <= sum(self.body.own(one).mass for one in self.body.links):
             return None
         return self._balanced(seen, force + np.tensordot(added, columns, axes=1), False)
 
