@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rhythmid.body.inertial_parameter import CENTRE, LOAD, MASS, MOMENT, PAYLOAD, TURNING, split
 from rhythmid.body.link_inertia import Principal, about_centre, point_mass, ten_of
 from rhythmid.body.machine import Machine
-from rhythmid.diagnose.constants import CONTRADICTS, UNNAMED_EFFORT
+from rhythmid.diagnose.constants import CONTRADICTS, PRACTICAL_EFFORT
 from rhythmid.diagnose.joints.joint_case import OF_LINKS, JointResult
 from rhythmid.diagnose.joints.link_evidence import laws_found
 from rhythmid.diagnose.joints.link_group import masses_alike
@@ -281,8 +281,8 @@ def likely_link(
 
 
 def _simplest(tried: Sequence[_Tried], balances: JointBalances, found: Mapping[str, JointResult]) -> _Tried:
-    """The change that is worth most. All ten numbers of a link also explain what models of real machines leave of an effort; so where they leave no less
-    than that, a change with fewer numbers is taken."""
+    """The change that is worth most. All ten numbers of a link also explain what filters and laws of friction leave; where they leave no less of any
+    effort by a practical size, a change with fewer numbers is taken."""
     best = max(tried, key=lambda one: one.worth)
     if best.change.kind != LOAD:
         return best
@@ -290,7 +290,7 @@ def _simplest(tried: Sequence[_Tried], balances: JointBalances, found: Mapping[s
     def leaves_more(one: _Tried, joint: str) -> bool:
         size = variation_of(balances.balance(joint, found[joint].late))
         more = one.fit.errors[joint] ** 2 - best.fit.errors[joint] ** 2
-        return math.sqrt(max(more, 0.0)) > UNNAMED_EFFORT * size
+        return math.sqrt(max(more, 0.0)) > PRACTICAL_EFFORT * size
 
     others = [one for one in tried if one is not best]
     alike = [one for one in others if not any(leaves_more(one, joint) for joint in found)]
