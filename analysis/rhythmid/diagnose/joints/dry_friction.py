@@ -6,6 +6,7 @@ from rhythmid.diagnose.effort.candidate import Start, extended, starts_of, wides
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.diagnose.joints.link_evidence import laws_of, parts_of
 from rhythmid.identify.inverse_dynamics.estimate import fit_effort, linearise
 from rhythmid.value import Prior
 
@@ -23,6 +24,12 @@ def with_dry_friction(one: JointResult) -> list[Fitted]:
         made = _fitted(nominal, one, start, aligned)
         return [made] if made is not None else []
     return []
+
+
+def laws_found(one: JointResult) -> list[Fitted]:
+    """The laws that a cause may leave at a joint: those of its `parts_of` that free no value of the body, and dry friction."""
+    laws, parts = laws_of(one), parts_of(one)
+    return [fit for fit in laws if fit in parts or fit.elements == (DRY,)] + with_dry_friction(one)
 
 
 def _fitted(nominal: Fitted, one: JointResult, start: Start, aligned: float) -> Fitted | None:

@@ -17,8 +17,8 @@ from rhythmid.body.inertial_parameter import CENTRE, LOAD, MASS, MOMENT, PAYLOAD
 from rhythmid.body.link_inertia import Principal, about_centre, point_mass, ten_of
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.constants import CONTRADICTS, PRACTICAL_EFFORT
+from rhythmid.diagnose.joints.dry_friction import laws_found
 from rhythmid.diagnose.joints.joint_case import OF_LINKS, JointResult
-from rhythmid.diagnose.joints.link_evidence import laws_found
 from rhythmid.diagnose.joints.link_group import masses_alike
 from rhythmid.diagnose.joints.machine_cause import (
     Beside,

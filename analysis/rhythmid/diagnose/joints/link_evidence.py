@@ -65,12 +65,6 @@ def parts_of(one: JointResult) -> list[Fitted]:
     ]
 
 
-def laws_found(one: JointResult) -> list[Fitted]:
-    """Those of the `parts_of` a joint that free no value of the body."""
-    laws = laws_of(one)
-    return [fit for fit in parts_of(one) if fit in laws]
-
-
 def laws_of(one: JointResult) -> list[Fitted]:
     """The hypotheses of a joint that free no value of the body and have no longer delay, the nominal path among them."""
     return [

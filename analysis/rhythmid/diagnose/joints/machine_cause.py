@@ -260,7 +260,8 @@ def best_beside(options: Mapping[str, Options], cause: Cause) -> Beside:
     """The hypothesis of each joint that is best beside the best cause, to first order.
 
     Cause and hypotheses are chosen in turn, and the joints weighted by what is then left of their efforts, from the cause that each hypothesis of one
-    effect alone gives: a law of a joint that stands for the cause would hide it. What models of real machines leave of an effort calls for no law.
+    effect alone gives: a law of a joint that stands for the cause would hide it. While the numbers are sought, what models of real machines
+    leave of an effort calls for no law.
     """
     slopes, spreads = cause.slopes, cause.spreads
     joints = list(options)
@@ -297,8 +298,9 @@ def best_beside(options: Mapping[str, Options], cause: Cause) -> Beside:
                 break
             seen.add(key)
             numbers = improved(numbers, places)
-    _, places, numbers = best
-    gain = chosen_with(nothing, True)[0] - chosen_with(numbers, True)[0]
+    numbers = best[2]
+    cost, places = chosen_with(numbers, True)
+    gain = chosen_with(nothing, True)[0] - cost
     return Beside({joint: options[joint].fits[place] for joint, place in places.items()}, numbers, gain)
 
 
