@@ -32,6 +32,14 @@ def laws_found(one: JointResult) -> list[Fitted]:
     return [fit for fit in laws if fit in parts or fit.elements == (DRY,)] + with_dry_friction(one)
 
 
+def dry_in_place(one: JointResult, law: Fitted) -> Fitted:
+    """Dry friction in place of another single law of friction; any other hypothesis as it is."""
+    terms = [law.fit.model.term(label) for label in law.elements]
+    if len(terms) != 1 or terms[0] is None or terms[0].element.family != "friction":
+        return law
+    return next((fit for fit in laws_found(one) if fit.elements == (DRY,)), law)
+
+
 def _fitted(nominal: Fitted, one: JointResult, start: Start, aligned: float) -> Fitted | None:
     balance = one.result.search.balance
     model, label = extended(nominal.fit.model, start, 1.0)

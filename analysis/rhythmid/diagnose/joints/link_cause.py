@@ -17,7 +17,7 @@ from rhythmid.body.inertial_parameter import CENTRE, LOAD, MASS, MOMENT, PAYLOAD
 from rhythmid.body.link_inertia import Principal, about_centre, point_mass, ten_of
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.constants import CONTRADICTS, PRACTICAL_EFFORT
-from rhythmid.diagnose.joints.dry_friction import laws_found
+from rhythmid.diagnose.joints.dry_friction import dry_in_place, laws_found
 from rhythmid.diagnose.joints.joint_case import OF_LINKS, JointResult
 from rhythmid.diagnose.joints.link_group import masses_alike
 from rhythmid.diagnose.joints.machine_cause import (
@@ -248,6 +248,16 @@ class _Tried:
         return bool(np.any(np.abs(numbers[:first]) > CONTRADICTS * std[:first]))
 
 
+def _tried(one: Ranked, balances: JointBalances, found: Mapping[str, JointResult]) -> _Tried:
+    """A change fitted to all joints beside the laws that are best to first order, or beside the plain dry friction in place of another law of friction
+    if this is worth more: which law of friction it is depends on the change."""
+    fits, start = one.beside.fits, one.change.start(one.beside.numbers)
+    plain = {joint: dry_in_place(found[joint], fit) for joint, fit in fits.items()}
+    sides = [fits] if all(plain[joint] is fit for joint, fit in fits.items()) else [fits, plain]
+    made = (weighed(one.change, balances, found, found, start, side, laws_found) for side in sides)
+    return _Tried(one.change, max(made, key=lambda fit: fit.weight))
+
+
 def likely_link(
     balances: JointBalances, records: Sequence[JointRecord], found: Mapping[str, JointResult], known: Collection[str] = (),
     stated: Collection[str] = (),
@@ -266,10 +276,7 @@ def likely_link(
 
     worthy = sorted((one for one in ranked if priced(one) > 0.0), key=lambda one: -priced(one))
     for link in dict.fromkeys(one.change.link for one in worthy):
-        tried = [
-            _Tried(one.change, weighed(one.change, balances, found, found, one.change.start(one.beside.numbers), one.beside.fits, laws_found))
-            for one in worthy if one.change.link == link
-        ]  # fmt: skip
+        tried = [_tried(one, balances, found) for one in worthy if one.change.link == link]
         best = _simplest(tried, balances, found)
         if not best.moved or best.worth <= (0.0 if link in stated else price):
             continue
