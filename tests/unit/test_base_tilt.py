@@ -9,7 +9,7 @@ from legged import TWO_LINKS, recorded, references
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.joints.base_tilt import BaseTilt, directions_of, turned
 from rhythmid.diagnose.joints.joint_diagnosis import MachineAnswer, diagnose_machine
-from rhythmid.diagnose.joints.payload_place import in_units_of_noise
+from rhythmid.diagnose.joints.joint_rows import in_units_of_noise
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 
 PATH = (

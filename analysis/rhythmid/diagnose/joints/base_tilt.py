@@ -7,7 +7,7 @@ pendulum's gravity or a spring, which each joint needs for itself where the base
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from rhythmid.body.robot_file import FREE
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS, HOLDS
 from rhythmid.diagnose.joints.joint_case import JointResult
-from rhythmid.diagnose.joints.machine_cause import Columns, WeightedRows, rows_of, worth_it
+from rhythmid.diagnose.joints.machine_cause import Columns, WeightedRows, pulled, rows_of, worth_it
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
@@ -205,15 +205,3 @@ def directions_of(rows: Sequence[WeightedRows], given: Array) -> tuple[Array, Ar
     directions = turns.T @ across
     missing = directions[~known]
     return directions[known], missing[0] if len(missing) == 1 else None
-
-
-def pulled(balances: JointBalances, weights: Columns, change: Array) -> JointBalances:
-    """The balances with another gravity, by this `change` (3,) [m/s^2]; columns of links are left as they are."""
-    motions = {
-        joint: [
-            motion if motion.coupling is None else replace(motion, coupling=motion.coupling + weight @ change)
-            for motion, weight in zip(made, weights[joint], strict=True)
-        ]
-        for joint, made in balances.motions.items()
-    }
-    return replace(balances, motions=motions)

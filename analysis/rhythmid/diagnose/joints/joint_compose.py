@@ -66,7 +66,7 @@ def compose_machine(
         if label.removeprefix(f"{BODY}.") not in links
     ]
     missing = once([_effect(machine, found[joint], answers[joint], label) for joint, label in open_])
-    missing += [_link(machine, one, _of_same_link(one, links)) for one in links.values()]
+    missing += [_link(machine, one, _of_same_link(one, links), answers) for one in links.values()]
     if tilt is not None:
         missing.append(_of_base(tilt, answers[tilt.shown]))
     missing += [_of_gear(one, answers[joint]) for joint, one in (gears or {}).items()]
@@ -208,18 +208,19 @@ def _of_same_link(wrong: WrongLink, links: Mapping[str, WrongLink]) -> list[Wron
     return [one for one in links.values() if split(one.parameter)[0] == link]
 
 
-def _link(machine: Machine, wrong: WrongLink, same: Sequence[WrongLink]) -> JointEffect:
-    """A link's mass, inertia, centre of mass or payload, with the evidence of the joint that shows it best; `same` are all corrected values
+def _link(
+    machine: Machine, wrong: WrongLink, same: Sequence[WrongLink], answers: Mapping[str, Diagnosis]
+) -> JointEffect:
+    """A link's mass, inertia, centre of mass or payload, with what it explains of the joint that shows it best; `same` are all corrected values
     of the link, which share the probability."""
-    one, label = wrong.shown, wrong.label
-    decision = one.result.decision
     name, kind = split(wrong.parameter)
     element = OF_LINKS[kind]
     slot, equation, _ = EQUATIONS[element]
+    _, gain = _explained_at(answers[wrong.shown])
     return JointEffect(
-        machine.body.joint_of(name), element, slot, equation, decision.shares[label],
-        decision.probability[label] / (len(same) + len(wrong.alike)), wrong.told, _gain(one), name,
-        probability_together(one, label), () if wrong.together is None else wrong.together.links,
+        machine.body.joint_of(name), element, slot, equation, wrong.share,
+        wrong.probability / (len(same) + len(wrong.alike)), wrong.told(machine.body), gain, name,
+        wrong.probability, () if wrong.together is None else wrong.together.links,
     )  # fmt: skip
 
 
@@ -302,7 +303,9 @@ def _holds(one: JointEffect, answers: Mapping[str, Diagnosis], of_links: Mapping
     same = of_links.get(one.link, ()) if one.link else ()
     if max(one.probability * max(len(same), 1), one.together) < STATED:
         return False
-    if answer is None or answer.verdict == "missing_physics":
+    if (
+        answer is None or answer.verdict == "missing_physics" or same
+    ):  # all joints together have judged a corrected link
         return True
     return not _sure_in_part(one, answers) and error_of(answer.fit["augmented"]) < BLIND
 

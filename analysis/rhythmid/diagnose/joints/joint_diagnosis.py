@@ -8,7 +8,6 @@ carries it. If one is found, it is corrected, and the joints that feel it are se
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rhythmid.body.body import BODY
@@ -20,16 +19,15 @@ from rhythmid.diagnose.case import EXPLAINED, SEARCHED, WEIGHED, Budget
 from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.joints.augmented import augmented
 from rhythmid.diagnose.joints.base_tilt import BaseTilt, likely_tilt
-from rhythmid.diagnose.joints.contradiction import Searched, contradicted
 from rhythmid.diagnose.joints.equivalents import equivalent_names, equivalents
 from rhythmid.diagnose.joints.gear_compliance import GearCompliance, likely_gear
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
-from rhythmid.diagnose.joints.link_centre import feels
+from rhythmid.diagnose.joints.link_cause import feels, likely_link
 from rhythmid.diagnose.joints.misfit import braking, misfits
 from rhythmid.diagnose.joints.stated_fit import stated_parameters
-from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
+from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.joints.held_reference import balances_of, likely_readings
@@ -220,78 +218,86 @@ def _explained(
     weighed: Machine | None = (
         None  # the machine whose shared causes have been compared with the laws of its joints
     )
-    while len(links) < most and len(balances.refuted) < most and budget.allows(correction, WEIGHED):
+    while max(len(links), len(balances.refuted_links)) < most and budget.allows(correction, WEIGHED):
+        told = _values_of_links(found, set(links))
+        again = list(found)
+        shared = None
         if weighed is not machine:
             weighed = machine
-            shared = _shared_cause(balances, records, found, tilt)
-            if shared is not None:
-                tell(shared.words)
-                if isinstance(shared, BaseTilt):
-                    tilt, machine = shared, machine.with_gravity(shared.gravity)
-                    balances = JointBalances.of(machine, records, balances)
-                else:
-                    gears[shared.joint], weighed = shared, None
-                    balances = balances.with_gears({**balances.gears, shared.joint: shared.gear})
-                unseen = JointBalances.of(machine, holdout, balances) if holdout else None
-                delay = reference_delay(balances, balances.computed) if balances.computed else None
-                better, refused_now = _searched(balances, unseen, list(found), catalogue, tell, budget, delay)
-                found, refused = {**found, **better}, {**refused, **refused_now}
-                continue
-        best = _heaviest(found, set(links))
-        if best is None:
-            break
-        link, result = best
-        wrong = wrong_link(balances, records, found, link, result)
+            shared = _shared_cause(balances, records, found, tilt, links, told)
         if budget.passed(WEIGHED):
             break
-        tried = wrong.put_right(machine)
-        better: dict[str, JointResult] = {}
-        refused_now: dict[str, str] = {}
-        refuted = removes(machine, wrong)
-        if not refuted:
-            changed = JointBalances.of(tried, records, balances)
-            again = [joint for joint in joints if feels(changed, joint, split(link)[0])]
-            seen = JointBalances.of(tried, holdout, changed) if holdout else None
-            late = reference_delay(changed, changed.computed) if changed.computed else None
-            search = partial(
-                _searched, changed, seen, catalogue=catalogue, tell=tell, budget=budget, delay=late
-            )
-            refuted, (better, refused_now) = contradicted(found, balances, changed, again, search)
-        if refuted:
-            tell(f"{link} of {result.joint} is refuted by the joints that it moves")
-            balances = JointBalances.of(machine, records, balances.without(result.joint, link))
-            unseen = JointBalances.of(machine, holdout, balances) if holdout else None
-            better, refused_now = _searched(balances, unseen, [result.joint], catalogue, tell, budget, delay)
+        if isinstance(shared, GearCompliance):
+            gears[shared.joint], weighed = shared, None
+            balances = balances.with_gears({**balances.gears, shared.joint: shared.gear})
+        elif isinstance(shared, BaseTilt):
+            tilt, machine = shared, machine.with_gravity(shared.gravity)
+            balances = JointBalances.of(machine, records, balances)
+        elif shared is not None:
+            links[shared.parameter], machine = shared, shared.corrected
+            balances = JointBalances.of(machine, records, balances)
+            again = [joint for joint in found if feels(balances, joint, split(shared.parameter)[0])]
+        elif told:
+            parameter, again = next(iter(told.items()))
+            tell(f"{parameter} of {again[0]} is refuted by the joints that it moves")
+            again, link = again[:1], split(parameter)[0]
+            for name in balances.links(again[0]):  # all kinds of changes of the link have been tried
+                balances = balances.without(again[0], name) if split(name)[0] == link else balances
+            balances = JointBalances.of(machine, records, balances)
         else:
-            rest = [joint for joint in again if joint not in better]
-            more, refused_too = search(rest)
-            better, refused_now = {**better, **more}, {**refused_now, **refused_too}
-            links[wrong.parameter] = wrong
-            machine, balances, delay, unseen = tried, changed, late, seen
+            break
+        if shared is not None:
+            tell(shared.words)
+        unseen = JointBalances.of(machine, holdout, balances) if holdout else None
+        delay = reference_delay(balances, balances.computed) if balances.computed else None
+        better, refused_now = _searched(balances, unseen, again, catalogue, tell, budget, delay)
         found, refused = {**found, **better}, {**refused, **refused_now}
     return _Explained(machine, found, refused, links, balances.leads, delay, tilt, gears, given)
 
 
 def _shared_cause(
-    balances: JointBalances, records: Sequence[JointRecord], found: Mapping[str, JointResult], tilt: BaseTilt | None
-) -> BaseTilt | GearCompliance | None:  # fmt: skip
-    """The cause of the machine as a whole with the strongest evidence; one `tilt` is enough."""
-    likely = (likely_tilt(balances, records, found) if tilt is None else None, likely_gear(balances, found))
+    balances: JointBalances, records: Sequence[JointRecord], found: Mapping[str, JointResult], tilt: BaseTilt | None,
+    links: Mapping[str, WrongLink], told: Mapping[str, Sequence[str]],
+) -> BaseTilt | GearCompliance | WrongLink | None:  # fmt: skip
+    """The cause of the machine as a whole with the strongest evidence; one `tilt` is enough. `links` are corrected, and `told` are values of links that
+    joints state by themselves."""
+    likely = (
+        likely_tilt(balances, records, found) if tilt is None else None,
+        likely_gear(balances, found),
+        likely_link(balances, records, found, links, {split(parameter)[0] for parameter in told}),
+    )
     return max((one for one in likely if one is not None), key=lambda one: one.weight, default=None)
+
+
+def _values_of_links(found: Mapping[str, JointResult], known: set[str]) -> dict[str, list[str]]:
+    """The values of links that joints state, without those that are `known`, with these joints; those with the strongest evidence first."""
+    made: list[tuple[float, str, str]] = []
+    for joint, one in found.items():
+        contest = one.result.contest
+        gain = one.result.selection.chosen.prediction.score - contest.nominal.prediction.score
+        for label in stated_at(one):
+            link = label.removeprefix(f"{BODY}.")
+            whole = f"{split(link)[0]}.{LOAD}"  # all its parameters were fitted
+            if label.startswith(f"{BODY}.") and link not in known and whole not in known:
+                made.append((-gain, link, joint))
+    told: dict[str, list[str]] = {}
+    for _, link, joint in sorted(made):
+        told.setdefault(link, []).append(joint)
+    return told
 
 
 def _searched(
     balances: JointBalances, unseen: JointBalances | None, joints: Sequence[str], catalogue: Catalogue,
-    tell: Tell, budget: Budget, delay: ReferenceDelay | None, end: float = EXPLAINED, waiting: int = 0,
-) -> Searched:  # fmt: skip
-    """The results of joints, and the reasons for those that cannot be judged. They share the time until this share of the budget has passed
-    with so many joints that are `waiting`: each has the same part of what those before it have left, in which it is also weighed."""
+    tell: Tell, budget: Budget, delay: ReferenceDelay | None, end: float = EXPLAINED,
+) -> tuple[dict[str, JointResult], dict[str, str]]:  # fmt: skip
+    """The results of joints, and the reasons for those that cannot be judged. They share the time until this share of the budget has passed:
+    each has the same part of what those before it have left, in which it is also weighed."""
     found: dict[str, JointResult] = {}
     refused: dict[str, str] = {}
     late = 0.0 if delay is None else delay.shared.value
     for place, joint in enumerate(joints):
         tell(f"joint {joint}")
-        own = budget.part(end, len(joints) + waiting - place)
+        own = budget.part(end, len(joints) - place)
         try:
             found[joint] = diagnose_joint(balances, unseen, joint, catalogue, tell, own, late)
         except InputError as error:
@@ -362,30 +368,6 @@ def _differs(one: JointResult, label: str) -> bool:
 def _removed(kind: str, before: float, after: float) -> bool:
     """Whether a value of a link has gone from what it is in the model."""
     return after <= 0.0 if kind == TURNING else after < LIGHTEST * before
-
-
-def removes(machine: Machine, wrong: WrongLink) -> bool:
-    """Whether a corrected value would remove a link's mass or its whole inertia: what all joints together say may, where one joint did not."""
-    _, kind = split(wrong.parameter)
-    return kind in wrong.values and _removed(
-        kind, machine.body.parameters[wrong.parameter], wrong.values[kind].value
-    )
-
-
-def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, JointResult] | None:
-    """The wrong parameter of a link with the strongest evidence, and the result of the joint that shows it."""
-    best: tuple[float, str, JointResult] | None = None
-    for one in found.values():
-        for label in stated_at(one):
-            link = label.removeprefix(f"{BODY}.")
-            whole = f"{split(link)[0]}.{LOAD}"  # all its parameters were fitted
-            if not label.startswith(f"{BODY}.") or link in known or whole in known:
-                continue
-            contest = one.result.contest
-            gain = one.result.selection.chosen.prediction.score - contest.nominal.prediction.score
-            if best is None or gain > best[0]:
-                best = gain, link, one
-    return None if best is None else best[1:]
 
 
 def _answer(one: JointResult, given: JointResult, stated: Sequence[str]) -> Diagnosis:

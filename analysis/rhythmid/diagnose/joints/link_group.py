@@ -17,8 +17,8 @@ from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.diagnose.joints.joint_rows import weighted_rows
 from rhythmid.diagnose.joints.link_evidence import own_path
-from rhythmid.diagnose.joints.payload_place import weighted_rows
 from rhythmid.identify.joints.joint_motion import JointBalances
 
 Array = NDArray[np.float64]

@@ -5,22 +5,25 @@ the search costs, and the odds of each of its numbers; and what it explains at s
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from rhythmid.diagnose.constants import HOLDS, PRACTICAL_EFFORT
+from rhythmid.diagnose.constants import HOLDS, PRACTICAL_EFFORT, UNNAMED_EFFORT
+from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.joints.dry_friction import with_dry_friction
 from rhythmid.diagnose.joints.joint_case import PROMISING, JointResult
-from rhythmid.diagnose.joints.link_evidence import gain_of, parts_of, with_body_of
-from rhythmid.diagnose.joints.payload_place import in_units_of_noise
+from rhythmid.diagnose.joints.joint_rows import in_units_of_noise
+from rhythmid.diagnose.joints.link_evidence import gain_of, laws_of, parts_of, with_body_of
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, fit_effort, variation_of
 from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.identify.student import autocorrelation_time, scale_of
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
@@ -30,6 +33,8 @@ WeightedRows = tuple[Array, Array]  # residual (n,) and columns (n, p) of a join
 # settles in three; the compliance of a gear moves all paths, and took ten (three left it six standard deviations off)
 MOST_ROUNDS, SETTLED = 12, 0.2
 TURNS = 20  # most changes between the best cause and the best hypotheses beside it; three settle it
+SAME = 0.1  # [nat] change of the log likelihood from which they have settled
+TINY = 1e-12  # least sum of squares, in units of the noise
 
 
 class Cause(Protocol):
@@ -41,8 +46,8 @@ class Cause(Protocol):
         ...
 
     @property
-    def least(self) -> float:
-        """Least value of each number."""
+    def least(self) -> float | Array:
+        """Least value of each number, or of all."""
         ...
 
     @property
@@ -70,13 +75,16 @@ class Cause(Protocol):
 @dataclass(frozen=True, eq=False)
 class Weighed:
     """The numbers (k,) of a cause with their `covariance` (k, k), the `paths` of the joints that were fitted beside them, the log odds of all
-    joints for it (`weight`), and the joint that shows it best (`shown`)."""
+    joints for it (`weight`), the joint that shows it best (`shown`), and what it explains of that joint's mismatch (`share`). `errors` is what is then left
+    of the effort of each joint."""
 
     numbers: Array
     covariance: Array
     paths: Mapping[str, Model]
     weight: float
     shown: str
+    share: float
+    errors: Mapping[str, float]
 
     @property
     def probability(self) -> float:
@@ -95,19 +103,53 @@ def worth_it(
     columns = _columns(cause, balances, found)
     if first_gain(cause, columns, weighing) < PROMISING:
         return None
-    options = {joint: _options(one, columns[joint]) for joint, one in weighing.items()}
-    given = {joint: balances.models[joint] for joint in found}
+    options = {joint: options_of(one, columns[joint]) for joint, one in weighing.items()}
+    beside = best_beside(options, cause).fits
     numbers, made = np.zeros(len(cause.spreads)), []
-    for paths in (given, {**given, **_best_beside(options, cause)}):
-        numbers, covariance, fitted = _fitted(cause, balances, found, paths, list(weighing), numbers)
-        after = cause.in_place(numbers, fitted)
-        made.append(_weighed(Weighed(numbers, covariance, fitted, 0.0, ""), balances, after, found, weighing))
+    for fits in ({}, beside):
+        one = weighed(cause, balances, found, weighing, numbers, fits)
+        numbers, made = one.numbers, [*made, one]
     plain, richer = made
     best = richer if richer.weight > plain.weight + decisive(1) else plain
     price = max(decisive(one.result.contest.candidates) for one in found.values())
     if best.weight <= price + decisive(1) * len(best.numbers):
         return None
-    return best if _matters(cause.imposed(best.numbers, best.paths), balances, weighing) else None
+    return best if matters(cause.imposed(best.numbers, best.paths), balances, weighing) else None
+
+
+def weighed(
+    cause: Cause, balances: JointBalances, found: Mapping[str, JointResult], judges: Mapping[str, JointResult], start: Array,
+    beside: Mapping[str, Fitted], rivals: Callable[[JointResult], list[Fitted]] = parts_of,
+) -> Weighed:  # fmt: skip
+    """The cause fitted from a `start` (k,) beside the given path of each joint, or beside that of a hypothesis, with the log odds of all joints for it.
+
+    With and without the cause each joint has the best of its `rivals` and of the hypothesis beside the cause.
+    """
+    paths = {joint: beside[joint].fit.model if joint in beside else balances.models[joint] for joint in found}
+    numbers, covariance, fitted, errors = _fitted(cause, balances, found, paths, list(judges), start)
+    gains: dict[str, float] = {}
+    after = cause.in_place(numbers, fitted)
+    for joint, one in found.items():
+        sides = ((side.models[joint], side.balance(joint, one.late)) for side in (balances, after))
+        parts = rivals(one)
+        parts += [beside[joint]] if joint in beside and beside[joint] not in parts else []
+        gains[joint] = gain_of(one, parts, *sides)
+    shown = max(judges, key=lambda joint: gains[joint])
+    weight = sum(gain if joint in judges else min(gain, 0.0) for joint, gain in gains.items())
+    share = _share(found[shown], balances, after, fitted[shown])
+    return Weighed(numbers, covariance, fitted, weight, shown, share, errors)
+
+
+def _share(one: JointResult, before: JointBalances, after: JointBalances, path: Model) -> float:
+    """Share of a joint's mismatch that a cause explains beside the given path, or beside a fitted `path` where its effects hide it."""
+    whole, removed = one.result.nominal.fit.error, 0.0
+    for beside in (before.models[one.joint], path):
+        without, with_it = (
+            fit_effort(side.balance(one.joint, one.late), with_body_of(side.models[one.joint], beside)).error
+            for side in (before, after)
+        )
+        removed = max(removed, without**2 - with_it**2)
+    return min(removed / whole**2, 1.0) if whole > 0.0 else 0.0
 
 
 def _columns(cause: Cause, balances: JointBalances, found: Mapping[str, JointResult]) -> Columns:
@@ -158,66 +200,124 @@ def _gained(rows: Sequence[WeightedRows], cause: Cause) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Option:
-    """A hypothesis of a joint, what it leaves beside any cause, as a triangle (r, p + 1) of columns and residual, and what its effects cost."""
+class Options:
+    """Hypotheses of a joint, what each leaves beside any cause, as triangles (h, r, p + 1) of columns and residual, and what its effects cost (h,).
 
-    model: Model
-    triangle: Array
-    price: float
-
-    def cost(self, change: Array) -> float:
-        """Negative log likelihood, with the price, under a `change` (p,) of the coordinates."""
-        left = self.triangle @ np.append(change, 1.0)
-        return 0.5 * float(left @ left) + self.price
-
-
-def _options(one: JointResult, columns: Sequence[Array]) -> list[_Option]:
-    """The hypotheses that a cause may leave at a joint, in units of the noise beside the chosen one."""
-    noise, price = one.result.chosen.fit.residual, decisive(one.result.contest.candidates)
-    made = []
-    for part in parts_of(one):
-        left, own = rows_of(one.result.search.balance, part.fit, columns, noise)
-        triangle: Array = np.asarray(np.linalg.qr(np.column_stack([own, left]), mode="r"))
-        made.append(_Option(part.fit.model, triangle, price * len(part.elements)))
-    return made
-
-
-def _best_beside(options: Mapping[str, list[_Option]], cause: Cause) -> dict[str, Model]:
-    """The path of each joint that is best beside the best cause, to first order.
-
-    Cause and paths are chosen in turn, from the cause that each hypothesis alone gives: a law of a joint that stands for the cause would hide it.
+    `count` is the number of independent rows. `usual` is the sum of squares that models of real machines leave of such an effort.
     """
-    slopes = cause.slopes
 
-    def best_with(chosen: Sequence[_Option]) -> Array:
-        rows = [one.triangle[:, :-1] @ slopes.T for one in chosen] + [np.diag(1.0 / cause.spreads)]
-        left = [one.triangle[:, -1] for one in chosen] + [np.zeros(len(slopes))]
-        found = -np.linalg.lstsq(np.concatenate(rows), np.concatenate(left), rcond=None)[0]
-        return np.maximum(np.asarray(found, dtype=np.float64), cause.least)
+    fits: Sequence[Fitted]
+    triangles: Array
+    prices: Array
+    count: float
+    usual: float
 
-    best: tuple[float, list[_Option]] | None = None
-    for start in (one for some in options.values() for one in some):
-        numbers, chosen = best_with([start]), []
+    def squares(self, change: Array) -> Array:
+        """Sums of squares (h,) under a `change` (p,) of the coordinates."""
+        left = self.triangles @ np.append(change, 1.0)
+        return np.maximum(np.sum(left**2, axis=1), TINY)
+
+    def costs(self, change: Array, usual: float = 0.0) -> Array:
+        """Negative log likelihoods (h,) with the best size of the noise, and with the prices, under a `change` (p,) of the coordinates, where a sum of
+        squares that is `usual` says nothing."""
+        return 0.5 * self.count * np.log(self.squares(change) + usual) + self.prices
+
+    def of(self, places: slice) -> "Options":
+        """The options beside these coordinates alone."""
+        own = [self.triangles[:, :, places], self.triangles[:, :, -1:]]
+        return replace(self, triangles=np.concatenate(own, axis=2))
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """The hypothesis of each joint, by joint, that is best beside the best cause, with the numbers (k,) and the `gain` of log likelihood, to first order."""
+
+    fits: Mapping[str, Fitted]
+    numbers: Array
+    gain: float
+
+
+def options_of(one: JointResult, columns: Sequence[Array]) -> Options:
+    """The hypotheses that a cause may have beside it at a joint, in units of the noise beside the chosen one.
+
+    They are all that its search has fitted, without a value of the body and a longer delay, which may stand for the cause, and a dry friction: a law
+    that is not the best one without the cause may be the best one beside it, as the friction of a joint that carries an unknown weight.
+    """
+    noise, price = one.result.chosen.fit.residual, decisive(one.result.contest.candidates)
+    balance = one.result.search.balance
+    fits = [*laws_of(one), *with_dry_friction(one)]
+    triangles = []
+    for part in fits:
+        left, own = rows_of(balance, part.fit, columns, noise)
+        triangles.append(np.linalg.qr(np.column_stack([own, left]), mode="r"))
+    count = len(noise) / autocorrelation_time(noise, balance.record)
+    usual = count * (UNNAMED_EFFORT * variation_of(balance) / scale_of(noise)) ** 2
+    prices = price * np.array([len(part.elements) for part in fits])
+    return Options(fits, np.array(triangles), prices, count, usual)
+
+
+def best_beside(options: Mapping[str, Options], cause: Cause) -> Beside:
+    """The hypothesis of each joint that is best beside the best cause, to first order.
+
+    Cause and hypotheses are chosen in turn, and the joints weighted by what is then left of their efforts, from the cause that each hypothesis of one
+    effect alone gives: a law of a joint that stands for the cause would hide it. While the numbers are sought, what models of real machines
+    leave of an effort calls for no law.
+    """
+    slopes, spreads = cause.slopes, cause.spreads
+    joints = list(options)
+    normal = {joint: _information(options[joint], slopes) for joint in joints}
+
+    def improved(numbers: Array, places: Mapping[str, int]) -> Array:
+        total = np.diag(np.append(spreads**-2.0, 0.0))
+        for joint, place in places.items():
+            left = options[joint].squares(numbers @ slopes)[place]
+            total = total + options[joint].count / left * normal[joint][place]
+        return np.maximum(-np.linalg.solve(total[:-1, :-1], total[:-1, -1]), cause.least)
+
+    def chosen_with(numbers: Array, told: bool) -> tuple[float, dict[str, int]]:
+        costs = {
+            joint: one.costs(numbers @ slopes, 0.0 if told else one.usual) for joint, one in options.items()
+        }
+        prior = 0.5 * float(np.sum((numbers / spreads) ** 2))
+        places = {joint: int(one.argmin()) for joint, one in costs.items()}
+        return prior + sum(float(one.min()) for one in costs.values()), places
+
+    nothing = np.zeros(len(spreads))
+    best = *chosen_with(nothing, False), nothing
+    single = [
+        (joint, k) for joint in joints for k, fit in enumerate(options[joint].fits) if len(fit.elements) <= 1
+    ]
+    seen: set[tuple[int, ...]] = set()
+    for joint, place in single:
+        numbers, cost = improved(nothing, {joint: place}), math.inf
         for _ in range(TURNS):
-            change, known = numbers @ slopes, chosen
-            chosen = [min(some, key=lambda one: one.cost(change)) for some in options.values()]
-            numbers = best_with(chosen)
-            if chosen == known:
+            before, (cost, places) = cost, chosen_with(numbers, False)
+            if cost < best[0]:
+                best = cost, places, numbers
+            if (key := tuple(places.values())) in seen and before - cost < SAME:
                 break
-        cost = sum(one.cost(numbers @ slopes) for one in chosen)
-        if best is None or cost < best[0]:
-            best = cost, chosen
-    assert best is not None  # each joint has its nominal path
-    return {joint: one.model for joint, one in zip(options, best[1], strict=True)}
+            seen.add(key)
+            numbers = improved(numbers, places)
+    numbers = best[2]
+    cost, places = chosen_with(numbers, True)
+    gain = chosen_with(nothing, True)[0] - cost
+    return Beside({joint: options[joint].fits[place] for joint, place in places.items()}, numbers, gain)
+
+
+def _information(options: Options, slopes: Array) -> Array:
+    """For each hypothesis the normal matrix (h, k + 1, k + 1) of the numbers and the residual."""
+    made = np.concatenate([options.triangles[:, :, :-1] @ slopes.T, options.triangles[:, :, -1:]], axis=2)
+    return np.swapaxes(made, 1, 2) @ made
 
 
 def _fitted(
     cause: Cause, balances: JointBalances, found: Mapping[str, JointResult], paths: Mapping[str, Model], judges: Sequence[str],
     start: Array,
-) -> tuple[Array, Array, dict[str, Model]]:  # fmt: skip
-    """The numbers that fit best beside these paths, their covariance, and the fitted paths; paths and numbers are fitted in turn, from a
+) -> tuple[Array, Array, dict[str, Model], dict[str, float]]:  # fmt: skip
+    """The numbers that fit best beside these paths, their covariance, the fitted paths and their errors; paths and numbers are fitted in turn, from a
     `start` (k,) of the numbers, until they settle."""
     numbers, covariance = start, np.diag(cause.spreads**2)
+    errors: dict[str, float] = {}
     fitted = {
         joint: one.result.nominal.fit.model if paths[joint] is balances.models[joint] else paths[joint]
         for joint, one in found.items()
@@ -232,6 +332,7 @@ def _fitted(
             for joint, one in found.items()
         }
         fitted = {joint: fit.model for joint, fit in fits.items()}
+        errors = {joint: fit.error for joint, fit in fits.items()}
         columns = cause.columns(now, numbers, fitted)
         weighted = [
             rows_of(now.balance(joint, found[joint].late), fits[joint], columns[joint]) for joint in judges
@@ -239,7 +340,7 @@ def _fitted(
         numbers, covariance = _refined(weighted, cause, before)
         if np.all(np.abs(numbers - before) <= SETTLED * np.sqrt(np.diag(covariance))):
             break
-    return numbers, covariance, fitted
+    return numbers, covariance, fitted, errors
 
 
 def _refined(rows: Sequence[WeightedRows], cause: Cause, start: Array) -> tuple[Array, Array]:
@@ -261,20 +362,7 @@ def _refined(rows: Sequence[WeightedRows], cause: Cause, start: Array) -> tuple[
     return solved.x, noise + apart @ apart.T
 
 
-def _weighed(
-    fit: Weighed, before: JointBalances, after: JointBalances, found: Mapping[str, JointResult], judges: Mapping[str, JointResult],
-) -> Weighed:  # fmt: skip
-    """The cause with the log odds of all joints, and the joint that shows it best."""
-    gains: dict[str, float] = {}
-    for joint, one in found.items():
-        sides = ((side.models[joint], side.balance(joint, one.late)) for side in (before, after))
-        gains[joint] = gain_of(one, parts_of(one), *sides)
-    shown = max(judges, key=lambda joint: gains[joint])
-    weight = sum(gain if joint in judges else min(gain, 0.0) for joint, gain in gains.items())
-    return Weighed(fit.numbers, fit.covariance, fit.paths, weight, shown)
-
-
-def _matters(now: JointBalances, before: JointBalances, found: Mapping[str, JointResult]) -> bool:
+def matters(now: JointBalances, before: JointBalances, found: Mapping[str, JointResult]) -> bool:
     """Whether the cause changes the effort of some joint by a practical size, beyond what the joint's path explains by itself."""
     for joint, one in found.items():
         balance = now.balance(joint, one.late)
@@ -283,3 +371,15 @@ def _matters(now: JointBalances, before: JointBalances, found: Mapping[str, Join
         if math.sqrt(max(removed, 0.0)) > PRACTICAL_EFFORT * variation_of(balance):
             return True
     return False
+
+
+def pulled(balances: JointBalances, weights: Columns, change: Array) -> JointBalances:
+    """The balances after this `change` (p,) of coordinates with these `weights` (n, p) on the efforts; columns of links are left as they are."""
+    motions = {
+        joint: [
+            motion if motion.coupling is None else replace(motion, coupling=motion.coupling + weight @ change)
+            for motion, weight in zip(made, weights[joint], strict=True)
+        ]
+        for joint, made in balances.motions.items()
+    }
+    return replace(balances, motions=motions)

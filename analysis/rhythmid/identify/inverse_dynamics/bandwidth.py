@@ -204,10 +204,16 @@ def _residuals(
 
 
 def _columns(free: FreeMap, motion: Motion, lines: Sequence[float]) -> Array:
-    """Regressors (n, q) for the effort of a motion: a free map, the motion itself and lines over position."""
+    """Regressors (n, q) for the effort of a motion: a free map, the motion itself, lines over position, and what else the body requires.
+
+    The latter is no part of the effort: it is computed from the motion, and above the motion it is the noise of a second derivative, which the
+    acceleration would explain.
+    """
     made = [free.columns(motion, np.zeros(len(motion.time))), motion.leg_position, motion.leg_velocity]
     if not motion.driven_by_base:
         made.append(motion.acceleration)
+    if motion.coupling is not None:
+        made.append(motion.coupling)
     turns = [2.0 * math.pi * motion.leg_position / wavelength for wavelength in lines]
     return np.column_stack([*made, *(wave(turn) for turn in turns for wave in (np.cos, np.sin))])
 

@@ -114,7 +114,7 @@ class JointBalances:
         bandwidths = (
             alike.bandwidths
             if alike
-            else {joint: _bandwidth(motions[joint], cut, dominant) for joint in machine.joints}
+            else {joint: bandwidth_below(motions[joint], cut, dominant) for joint in machine.joints}
         )
         computed = tuple(joint for joint in machine.joints if joint in stretches[0].reference)
         made = cls(
@@ -159,6 +159,11 @@ class JointBalances:
     def without(self, joint: str, parameter: str) -> "JointBalances":
         """The balances in which the search at a joint does not free a parameter of a link."""
         return replace(self, refuted=self.refuted | {(joint, parameter)})
+
+    @property
+    def refuted_links(self) -> frozenset[tuple[str, str]]:
+        """Pairs of a joint and a link of which parameters are refuted there."""
+        return frozenset((joint, split(name)[0]) for joint, name in self.refuted)
 
     def links(self, joint: str) -> tuple[str, ...]:
         """Links to whose mass and inertia a joint is sensitive, as "link.mass" and "link.inertia", and those to
@@ -377,11 +382,3 @@ def _reference(machine: Machine, joint: str, body: BodyMotion) -> Reference:
 def _decimated(body: BodyMotion, signal: Array) -> Array:
     """A signal at a stretch's samples, decimated to the motion's samples."""
     return low_pass(signal, body.stretch.period, 1.0 / (FINER * body.period))[:: body.every]
-
-
-def _bandwidth(motions: Sequence[Motion], cut: float, dominant: float) -> Bandwidth:
-    """The bandwidth of a joint's effort, given the force that the rest of the body requires."""
-    own = [
-        replace(one, effort=one.effort - (0.0 if one.coupling is None else one.coupling)) for one in motions
-    ]
-    return bandwidth_below(own, cut, dominant)

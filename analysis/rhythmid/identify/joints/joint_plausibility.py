@@ -70,9 +70,20 @@ def likely_joint_mend(machine: Machine, records: Sequence[JointRecord]) -> str |
         if mounting is not None and _fits(mounting.left, declared):
             words = f"{mounting.words()}. {_gain(motion, mounting.left, declared)}"
             told.append((mean_left(mounting.left) + HELPS, words))
+        if told and _carried(motion, min(told)[0]):
+            return None
         if told:
             return f"{record.name}: {min(told)[1]}"
     return None
+
+
+def _carried(motion: RecordedMotion, cost: float) -> bool:
+    """Whether a body that the last link of a chain carries explains the efforts of all joints at least as well as changes of this `cost` do.
+
+    A hand on a light wrist multiplies the effort of its joint, as another unit would. The joints above feel the same hand.
+    """
+    loaded = (motion.loaded(link) for link in motion.body.ends)
+    return any(left is not None and mean_left(left) + HELPS <= cost for left in loaded)
 
 
 def _moved(record: JointRecord) -> float:

@@ -125,7 +125,10 @@ class RecordedMotion:
         seen = self.seen(readings)
         if seen is None:
             return tuple(Balanced(1.0) for _ in readings)
-        force = self.body.inverse(seen.pose, seen.rate, seen.acceleration)
+        return self._balanced(seen, self.body.inverse(seen.pose, seen.rate, seen.acceleration), free)
+
+    def _balanced(self, seen: "Seen", force: Array, free: bool) -> tuple[Balanced, ...]:
+        """Effort residuals of each joint beside a `force` (n, nv) that the body requires."""
         return tuple(
             _fitted(effort, force[:, own] - rotor * a, x, v, a, free)
             for effort, own, rotor, (x, v, a) in zip(
@@ -147,10 +150,29 @@ class RecordedMotion:
         motion = seen.pose, seen.rate, seen.acceleration
         without = self.body.with_gravity(np.zeros(3)).inverse(*motion)
         weight = np.stack([self.body.with_gravity(axis).inverse(*motion) - without for axis in np.eye(3)])
-        found, share = self.body.gravity, np.ones(len(self.joints))
+        return self._shared_numbers(seen, without, weight)
+
+    def loaded(self, link: str) -> tuple[Balanced, ...] | None:
+        """Effort residuals of each joint as declared where a link carries the body with which least is left of all; None where it would be lighter,
+        or heavier than the machine: none carries more than it weighs."""
+        seen = self.seen(self.as_declared)
+        if seen is None:
+            return None
+        motion = seen.pose, seen.rate, seen.acceleration
+        force = self.body.inverse(*motion)
+        columns = np.moveaxis(self.body.inertial_columns(link, *motion), 2, 0)
+        added = self._shared_numbers(seen, force, columns)
+        if not 0.0 < added[0] <= sum(self.body.own(one).mass for one in self.body.links):
+            return None
+        return self._balanced(seen, force + np.tensordot(added, columns, axes=1), False)
+
+    def _shared_numbers(self, seen: "Seen", force: Array, weights: Array) -> Array:
+        """The numbers (p,) that all joints share and with which least is left of their efforts: beside a `force` (n, nv) that does not depend on
+        them, they act with `weights` (p, n, nv)."""
+        found, share = np.zeros(len(weights)), np.ones(len(self.joints))
         for _ in range(REWEIGHTED):
             made = [
-                (_columns(weight[:, :, own].T, x, v, a), effort - without[:, own] + rotor * a)
+                (_columns(weights[:, :, own].T, x, v, a), effort - force[:, own] + rotor * a)
                 for effort, own, rotor, (x, v, a) in zip(
                     seen.effort, self._velocities, self._armature, self._along(seen), strict=True
                 )
@@ -209,21 +231,22 @@ def _fitted(effort: Array, asked: Array, x: Array, v: Array, a: Array, free: boo
 
 
 def _columns(weight: Array, x: Array, v: Array, a: Array) -> Array:
-    """Columns (n, 10) for a joint: its weight under gravity along each axis either way, and its losses and rotor."""
+    """Columns (n, 2 p + 4) for a joint: the effects (n, p) of shared numbers either way, and its losses and rotor."""
     return np.column_stack([weight, -weight, v, np.sign(v), x, a])
 
 
 def _shared(joints: Sequence[tuple[Array, Array]], scale: Array) -> tuple[Array, Array]:
-    """Gravity (3,) that all joints share, and the rms left at each; `joints` are columns and what is wanted, to be divided by `scale`."""
+    """Numbers (p,) that all joints share, and the rms left at each; `joints` are columns and what is wanted, to be divided by `scale`."""
     own = len(LOSSES)
-    whole = np.zeros((sum(len(wanted) for _, wanted in joints), 6 + own * len(joints)))
+    both = joints[0][0].shape[1] - own
+    whole = np.zeros((sum(len(wanted) for _, wanted in joints), both + own * len(joints)))
     wanted = np.zeros(len(whole))
     begin, parts = 0, []
     for place, ((columns, one), size) in enumerate(zip(joints, scale, strict=True)):
         part = slice(begin, begin := begin + len(one))
         centred = (columns - columns.mean(axis=0)) / size
-        whole[part, :6] = centred[:, :6]
-        whole[part, 6 + own * place : 6 + own * (place + 1)] = centred[:, 6:]
+        whole[part, :both] = centred[:, :both]
+        whole[part, both + own * place : both + own * (place + 1)] = centred[:, both:]
         wanted[part] = (one - one.mean()) / size
         parts.append(part)
     norms = column_norms(whole)
@@ -231,7 +254,7 @@ def _shared(joints: Sequence[tuple[Array, Array]], scale: Array) -> tuple[Array,
     values = values / norms
     missed = wanted - whole @ values
     left = np.array([float(np.sqrt(np.mean(missed[part] ** 2))) for part in parts]) * scale
-    return values[:3] - values[3:6], left
+    return values[: both // 2] - values[both // 2 : both], left
 
 
 def _without_sign(columns: Array, wanted: Array) -> tuple[Array, float]:
