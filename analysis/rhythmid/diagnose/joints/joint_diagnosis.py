@@ -25,6 +25,7 @@ from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.link_cause import feels, likely_link
+from rhythmid.diagnose.joints.link_exchange import exchanged
 from rhythmid.diagnose.joints.misfit import braking, misfits
 from rhythmid.diagnose.joints.stated_fit import stated_parameters
 from rhythmid.diagnose.joints.wrong_link import WrongLink
@@ -215,6 +216,7 @@ def _explained(
     most = max(MOST_LINKS, len(machine.body.links))
     tilt: BaseTilt | None = None
     gears: dict[str, GearCompliance] = {}
+    uncorrected = machine
     weighed: Machine | None = (
         None  # the machine whose shared causes have been compared with the laws of its joints
     )
@@ -232,6 +234,7 @@ def _explained(
             balances = balances.with_gears({**balances.gears, shared.joint: shared.gear})
         elif isinstance(shared, BaseTilt):
             tilt, machine = shared, machine.with_gravity(shared.gravity)
+            uncorrected = uncorrected.with_gravity(shared.gravity)
             balances = JointBalances.of(machine, records, balances)
         elif shared is not None:
             links[shared.parameter], machine = shared, shared.corrected
@@ -252,6 +255,16 @@ def _explained(
         delay = reference_delay(balances, balances.computed) if balances.computed else None
         better, refused_now = _searched(balances, unseen, again, catalogue, tell, budget, delay)
         found, refused = {**found, **better}, {**refused, **refused_now}
+    if len(links) > 1 and budget.allows(correction, WEIGHED):
+        tell("fitting the changes of all links together")
+        if together := exchanged(JointBalances.of(uncorrected, records, balances), records, found, links):
+            changed = {split(parameter)[0] for parameter in links}
+            links, machine = together, next(iter(together.values())).corrected
+            balances = JointBalances.of(machine, records, balances)
+            unseen = JointBalances.of(machine, holdout, balances) if holdout else None
+            again = [joint for joint in found if any(feels(balances, joint, link) for link in changed)]
+            better, refused_now = _searched(balances, unseen, again, catalogue, tell, budget, delay)
+            found, refused = {**found, **better}, {**refused, **refused_now}
     return _Explained(machine, found, refused, links, balances.leads, delay, tilt, gears, given)
 
 

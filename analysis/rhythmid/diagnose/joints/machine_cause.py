@@ -37,8 +37,8 @@ SAME = 0.1  # [nat] change of the log likelihood from which they have settled
 TINY = 1e-12  # least sum of squares, in units of the noise
 
 
-class Cause(Protocol):
-    """A cause with k numbers, of which p coordinates, such as the components of gravity, change the efforts linearly."""
+class Numbers(Protocol):
+    """The k numbers of a cause, of which p coordinates, such as the components of gravity, change the efforts linearly."""
 
     @property
     def spreads(self) -> Array:
@@ -58,6 +58,10 @@ class Cause(Protocol):
     def coordinates(self, numbers: Array) -> Array:
         """The coordinates (p,) beyond those of the machine as it is, for these numbers (k,)."""
         ...
+
+
+class Cause(Numbers, Protocol):
+    """A cause, and the balances of the machine that has it."""
 
     def imposed(self, numbers: Array, paths: Mapping[str, Model]) -> JointBalances:
         """The balances with these numbers, while the joints have these paths."""
@@ -337,14 +341,14 @@ def _fitted(
         weighted = [
             rows_of(now.balance(joint, found[joint].late), fits[joint], columns[joint]) for joint in judges
         ]
-        numbers, covariance = _refined(weighted, cause, before)
+        numbers, covariance = refined(weighted, cause, before)
         if np.all(np.abs(numbers - before) <= SETTLED * np.sqrt(np.diag(covariance))):
             break
     return numbers, covariance, fitted, errors
 
 
-def _refined(rows: Sequence[WeightedRows], cause: Cause, start: Array) -> tuple[Array, Array]:
-    """Improved numbers (k,) from a `start` (k,), and their covariance (k, k); `rows` are residuals and columns in units of the noise."""
+def refined(rows: Sequence[WeightedRows], cause: Numbers, start: Array) -> tuple[Array, Array]:
+    """Improved numbers (k,) from a `start` (k,), and their covariance (k, k); `rows` are residuals and columns in units of the noise, about the start."""
     triangles = [np.linalg.qr(np.column_stack([columns, left]), mode="r") for left, columns in rows]
     before = cause.coordinates(start)
 
