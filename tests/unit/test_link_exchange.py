@@ -10,7 +10,7 @@ from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.joints.joint_case import diagnose_joint
-from rhythmid.diagnose.joints.link_exchange import exchanged
+from rhythmid.diagnose.joints.link_exchange import exchanged, exchanges
 from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.identify.joints.joint_motion import JointBalances
@@ -72,3 +72,18 @@ def test_a_link_that_is_right_is_left_out(arm: Machine):
     made = together(arm, {"lower.mass": mass}, ("lower.mass", first), ("upper.centre_of_mass", second))
     assert made is not None and set(made) == {"lower.mass"}
     assert made["lower.mass"].values["mass"].value == pytest.approx(mass, rel=0.01)
+
+
+def test_an_exchange_takes_a_change_away_or_puts_one_with_no_more_numbers_in_the_place_of_one():
+    counts = {(link, kind): count for link in "abc" for kind, count in (("mass", 1), ("centre_of_mass", 3))}
+    changes = {"a.mass": ("a", "mass"), "b.centre_of_mass": ("b", "centre_of_mass")}
+    assert exchanges(changes, counts) == [
+        {"b.centre_of_mass": ("b", "centre_of_mass")},
+        {"a.mass": ("c", "mass"), "b.centre_of_mass": ("b", "centre_of_mass")},
+        {"a.mass": ("a", "mass")},
+        {"a.mass": ("a", "mass"), "b.centre_of_mass": ("b", "mass")},
+        {"a.mass": ("a", "mass"), "b.centre_of_mass": ("c", "mass")},
+        {"a.mass": ("a", "mass"), "b.centre_of_mass": ("c", "centre_of_mass")},
+    ]
+    alone = {"a.mass": ("a", "mass")}
+    assert {} not in exchanges(alone, counts)

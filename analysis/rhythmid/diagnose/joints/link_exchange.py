@@ -1,8 +1,8 @@
 """Changes of several links fitted to all joints together, and simplified where the others make that possible.
 
-Links are corrected one after another, each as it explains best what those before it have left. A link that stood for a part of a later one, or that
-took more numbers for it, is found when all are fitted at once: a change is left out, or one with fewer numbers takes its place, as long as the
-evidence, less the price of links and numbers, grows (backward elimination).
+Links are corrected one after another, each as it explains best what those before it have left. A link that stood for a part of another, or that
+took more numbers for it, shows when all are fitted at once: a change is left out, or one of this or of another link with no more numbers takes its
+place, as long as the evidence, less the price of links and numbers, grows.
 """
 
 import math
@@ -15,19 +15,20 @@ from scipy.linalg import block_diag
 
 from rhythmid.body.inertial_parameter import MASS, MOMENT, PAYLOAD, split
 from rhythmid.body.link_inertia import point_mass
-from rhythmid.body.machine import Machine
 from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.diagnose.joints.joint_case import JointResult
-from rhythmid.diagnose.joints.link_cause import LinkChange, columns_of, kinds_of
+from rhythmid.diagnose.joints.link_cause import NUMBERS, LinkChange, columns_of, kinds_of
 from rhythmid.diagnose.joints.link_evidence import laws_of
-from rhythmid.diagnose.joints.machine_cause import SETTLED, WeightedRows, refined, rows_of
+from rhythmid.diagnose.joints.machine_cause import SETTLED, refined, rows_of
 from rhythmid.diagnose.joints.wrong_link import WrongLink, values_of
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
 
 Array = NDArray[np.float64]
-Kinds = Mapping[str, str]  # what is wrong of each link
+Changes = Mapping[
+    str, tuple[str, str]
+]  # link and kind of the change that stands in the place of each correction
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +64,10 @@ class _Together:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """The changes `kinds` of links with their best numbers (k,), the covariance (k, k), and what they are worth [nat], up to a constant."""
+    """The `changes` with their best `numbers` (k,), the `covariance` (k, k), and what they are worth [nat], up to a constant."""
 
-    kinds: Kinds
+    changes: Changes
+    cause: _Together
     numbers: Array
     covariance: Array
     worth: float
@@ -84,36 +86,50 @@ def exchanged(
     """
     if len(links) < 2 or any(_not_separated(one) for one in links.values()):
         return None
-    body, machine = given.machine.body, list(links.values())[-1].corrected
-    kinds = dict(split(parameter) for parameter in links)
-    weights = {link: columns_of(given, link) for link in kinds}
-    before = np.concatenate([_ten(machine.body, link) - _ten(body, link) for link in kinds])
+    body, corrected = given.machine.body, list(links.values())[-1].corrected.body
+    weights = {link: columns_of(given, link) for link in body.links}
+    places = {link: slice(NUMBERS * place, NUMBERS * (place + 1)) for place, link in enumerate(weights)}
+    before = np.concatenate([_ten(corrected, link) - _ten(body, link) for link in weights])
     rows = []
     for joint, one in found.items():
-        together = [
-            np.concatenate(parts, axis=1) for parts in zip(*(weights[link][joint] for link in kinds), strict=True)
-        ]  # fmt: skip
+        every = [
+            np.concatenate(parts, axis=1)
+            for parts in zip(*(weights[link][joint] for link in weights), strict=True)
+        ]
         law = one.result.chosen if one.result.chosen in laws_of(one) else one.result.nominal
-        left, columns = rows_of(one.result.search.balance, law.fit, together, one.result.chosen.fit.residual)
-        rows.append((left - columns @ before, columns))
-    places = {link: slice(10 * place, 10 * (place + 1)) for place, link in enumerate(kinds)}
+        left, columns = rows_of(one.result.search.balance, law.fit, every, one.result.chosen.fit.residual)
+        triangle = np.asarray(np.linalg.qr(np.column_stack([columns, left - columns @ before]), mode="r"))
+        rows.append((triangle[:, -1], triangle[:, :-1]))
+    kinds = {link: kinds_of(given, link) for link in weights}
     price = max(decisive(one.result.contest.candidates) for one in found.values())
-    price += math.log(sum(len(kinds_of(given, link)) for link in body.links))
+    price += math.log(sum(map(len, kinds.values())))
+    single = {
+        (link, kind): LinkChange(given, records, link, kind, weights[link])
+        for link in weights
+        for kind in kinds[link]
+    }
 
-    def state_of(some: Kinds) -> _State:
-        changes = [LinkChange(given, records, link, kind, weights[link]) for link, kind in some.items()]
-        own = [places[link] for link in some]
-        return _fitted(_Together(changes), some, [(left, _of(columns, own)) for left, columns in rows], price)
+    def fitted(changes: Changes) -> _State:
+        cause = _Together([single[one] for one in changes.values()])
+        own = [places[link] for link, _ in changes.values()]
+        some = [(left, np.concatenate([columns[:, one] for one in own], axis=1)) for left, columns in rows]
+        numbers, covariance = refined(some, cause, np.zeros(len(cause.spreads)))
+        moved = cause.coordinates(numbers)
+        cost = sum(0.5 * float(np.sum((left + columns @ moved) ** 2)) for left, columns in some)
+        cost += 0.5 * float(np.sum((numbers / cause.spreads) ** 2))
+        paid = decisive(1) * len(numbers) + price * len(changes)
+        return _State(changes, cause, numbers, covariance, -cost - paid)
 
-    state = first = state_of(kinds)
-    while simpler := _simpler(state.kinds, given):
-        best = max((state_of(one) for one in simpler), key=lambda one: one.worth)
+    state = first = fitted({name: split(name) for name in links})
+    while others := exchanges(state.changes, {key: len(one.spreads) for key, one in single.items()}):
+        best = max((fitted(one) for one in others), key=lambda one: one.worth)
         if best.worth <= state.worth:
             break
         state = best
-    if state is first and _as_before(state, before, given, records, weights):
+    own = np.concatenate([before[places[link]] for link, _ in state.changes.values()])
+    if state is first and _as_before(state, own):
         return None
-    return _corrected(state, given, records, weights, links)
+    return _corrections(state, given, links)
 
 
 def _not_separated(one: WrongLink) -> bool:
@@ -126,71 +142,44 @@ def _ten(body: MujocoBody, link: str) -> Array:
     return body.own(link).ten + (load * point_mass(body.ends[link]) if load else 0.0)
 
 
-def _of(columns: Array, places: Sequence[slice]) -> Array:
-    return np.concatenate([columns[:, one] for one in places], axis=1)
+def exchanges(changes: Changes, counts: Mapping[tuple[str, str], int]) -> list[Changes]:
+    """The changes with one of them left out, if it is not the last one, or with another one in its place.
 
-
-def _fitted(cause: _Together, kinds: Kinds, rows: Sequence[WeightedRows], price: float) -> _State:
-    """The best numbers of these changes, beside the laws of the joints."""
-    numbers, covariance = refined(rows, cause, np.zeros(len(cause.spreads)))
-    change = cause.coordinates(numbers)
-    cost = sum(0.5 * float(np.sum((left + columns @ change) ** 2)) for left, columns in rows)
-    cost += 0.5 * float(np.sum((numbers / cause.spreads) ** 2))
-    return _State(kinds, numbers, covariance, -cost - decisive(1) * len(numbers) - price * len(kinds))
-
-
-def _simpler(kinds: Kinds, given: JointBalances) -> list[Kinds]:
-    """The changes with one of them left out, or with one of fewer numbers in its place; one is left at least."""
-    made: list[Kinds] = []
-    for link, kind in kinds.items():
-        if len(kinds) > 1:
-            made.append({other: one for other, one in kinds.items() if other != link})
-        count = _count(given, link, kind)
-        made += [
-            {**kinds, link: other} for other in kinds_of(given, link) if _count(given, link, other) < count
-        ]
+    That is one with fewer numbers (`counts`) of the same link, or one with no more numbers of a link that none of them changes.
+    """
+    made: list[Changes] = []
+    taken = {link for link, _ in changes.values()}
+    for name, own in changes.items():
+        if len(changes) > 1:
+            made.append({other: one for other, one in changes.items() if other != name})
+        for one, count in counts.items():
+            if (count < counts[own]) if one[0] == own[0] else (one[0] not in taken and count <= counts[own]):
+                made.append({**changes, name: one})
     return made
 
 
-def _count(given: JointBalances, link: str, kind: str) -> int:
-    return len(LinkChange(given, (), link, kind, {}).spreads)
-
-
-def _as_before(
-    state: _State, before: Array, given: JointBalances, records: Sequence[JointRecord], weights: Mapping[str, Mapping],
-) -> bool:  # fmt: skip
-    """Whether the corrections `before` (10 l,), one after another, are those of the fit together, within a part of its standard deviations."""
-    cause = _Together(
-        [LinkChange(given, records, link, kind, dict(weights[link])) for link, kind in state.kinds.items()]
-    )
-    slopes = cause.slopes
-    moved = np.linalg.lstsq(slopes.T, before - cause.coordinates(state.numbers), rcond=None)[0]
+def _as_before(state: _State, before: Array) -> bool:
+    """Whether the corrections `before` are those of the fit together, within a part of its standard deviations."""
+    cause = state.cause
+    moved = np.linalg.lstsq(cause.slopes.T, before - cause.coordinates(state.numbers), rcond=None)[0]
     return bool(np.all(np.abs(moved) <= SETTLED * np.sqrt(np.diag(state.covariance))))
 
 
-def _corrected(
-    state: _State, given: JointBalances, records: Sequence[JointRecord], weights: Mapping[str, Mapping], links: Mapping[str, WrongLink],
-) -> dict[str, WrongLink]:  # fmt: skip
-    """The findings with the numbers of a state, and the machine with all of them."""
-    changes = [
-        LinkChange(given, records, link, kind, dict(weights[link])) for link, kind in state.kinds.items()
-    ]
-    parts = _Together(changes).parts
-    machine: Machine = given.machine
-    for one, part in zip(changes, parts, strict=True):
+def _corrections(state: _State, given: JointBalances, links: Mapping[str, WrongLink]) -> dict[str, WrongLink]:
+    """The corrections with the numbers of a state, and the machine with all of them.
+
+    Probability and share are those of the corrections in whose places they stand.
+    """
+    made = list(zip(state.changes, state.cause.changes, state.cause.parts, strict=True))
+    machine = given.machine
+    for _, one, part in made:
         machine = replace(one, balances=replace(given, machine=machine)).machine(state.numbers[part])
-    known = {split(parameter)[0]: one for parameter, one in links.items()}
-    return {
-        f"{one.link}.{one.kind}": replace(
-            known[one.link],
-            parameter=f"{one.link}.{one.kind}",
-            values=values_of(
-                given.machine.body, machine.body, one.link, one.kind, state.covariance[part, part]
-            ),
-            corrected=machine,
-            alike=tuple(
-                name for name in known[one.link].alike if split(known[one.link].parameter)[1] == one.kind
-            ),
+    found: dict[str, WrongLink] = {}
+    for name, one, part in made:
+        parameter, covariance = f"{one.link}.{one.kind}", state.covariance[part, part]
+        values = values_of(given.machine.body, machine.body, one.link, one.kind, covariance)
+        alike = links[name].alike if parameter == name else ()
+        found[parameter] = replace(
+            links[name], parameter=parameter, values=values, corrected=machine, alike=alike
         )
-        for one, part in zip(changes, parts, strict=True)
-    }
+    return found
