@@ -26,8 +26,21 @@ TWO_LINKS = """<robot name="two">
     <limit lower="-3" upper="3" effort="50" velocity="10"/></joint>
 </robot>
 """
+# of each of its joints
+CONTROLLED = (
+    "{command: [{input_delay: {delay: 0.0}}, {position_control: {proportional: {value: 80, fixed: true}, "
+    "derivative: {value: 2.0, fixed: true}}}], force: [{viscous_damper: {damping: 0.1}}]}"
+)
 MODELS = Path(str(files("rhythmid"))) / "models" / "legs"
 Array = NDArray[np.float64]
+
+
+def two_links(folder: Path, robot: str = TWO_LINKS, body: str = "") -> Machine:
+    """The machine of a `robot` with the joints of `TWO_LINKS` under position control; more keys of its `body`."""
+    (folder / "two.urdf").write_text(robot)
+    paths = f"joints:\n  one: {CONTROLLED}\n  two: {CONTROLLED}\n"
+    (folder / "two.yaml").write_text(f"body: {{urdf: two.urdf, contacts: false{body}}}\n{paths}")
+    return Machine.load(folder / "two.yaml")
 
 
 def fixed_leg(folder: Path) -> Path:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from legged import TWO_LINKS, recorded, references
+from legged import recorded, references, two_links
 
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.joints.base_tilt import BaseTilt, directions_of, turned
@@ -12,22 +12,13 @@ from rhythmid.diagnose.joints.joint_diagnosis import MachineAnswer, diagnose_mac
 from rhythmid.diagnose.joints.joint_rows import in_units_of_noise
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 
-PATH = (
-    "{command: [{input_delay: {delay: 0.0}}, {position_control: {proportional: {value: 80, fixed: true}, "
-    "derivative: {value: 2.0, fixed: true}}}], force: [{viscous_damper: {damping: 0.1}}]}"
-)
 LAWS = ("viscous_damper", "coulomb_friction", "constant_force", "pendulum_gravity")
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
 
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory) -> Machine:
-    folder = tmp_path_factory.mktemp("arm")
-    (folder / "two.urdf").write_text(TWO_LINKS)
-    (folder / "two.yaml").write_text(
-        f"body: {{urdf: two.urdf, contacts: false}}\njoints:\n  one: {PATH}\n  two: {PATH}\n"
-    )
-    return Machine.load(folder / "two.yaml")
+    return two_links(tmp_path_factory.mktemp("arm"))
 
 
 def diagnosed(plant: Machine, nominal: Machine) -> MachineAnswer:

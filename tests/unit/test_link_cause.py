@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from legged import TWO_LINKS, recorded, references
+from legged import recorded, references, two_links
 
 from rhythmid.body.link_inertia import Principal
 from rhythmid.body.machine import Machine
@@ -15,21 +15,12 @@ from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
 
-PATH = (
-    "{command: [{input_delay: {delay: 0.0}}, {position_control: {proportional: {value: 80, fixed: true}, "
-    "derivative: {value: 2.0, fixed: true}}}], force: [{viscous_damper: {damping: 0.1}}]}"
-)
 Searched = tuple[JointBalances, list[JointRecord], dict[str, JointResult]]
 
 
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory) -> Machine:
-    folder = tmp_path_factory.mktemp("arm")
-    (folder / "two.urdf").write_text(TWO_LINKS)
-    (folder / "two.yaml").write_text(
-        f"body: {{urdf: two.urdf, contacts: false}}\njoints:\n  one: {PATH}\n  two: {PATH}\n"
-    )
-    return Machine.load(folder / "two.yaml")
+    return two_links(tmp_path_factory.mktemp("arm"))
 
 
 def searched(plant: Machine, nominal: Machine, laws: tuple[str, ...] = ()) -> Searched:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from legged import TWO_LINKS, recorded, references
+from legged import TWO_LINKS, recorded, references, two_links
 
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.effort.candidate import fixed_values
@@ -16,21 +16,13 @@ from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
 
-PATH = (
-    "{command: [{input_delay: {delay: 0.0}}, {position_control: {proportional: {value: 80, fixed: true}, "
-    "derivative: {value: 2.0, fixed: true}}}], force: [{viscous_damper: {damping: 0.1}}]}"
-)
 CENTRE, FARTHER = "0 0.02 -0.15", "0 0.02 -0.23"  # of the lower link, in its frame [m]
 
 
 @pytest.fixture
 def arm(tmp_path: Path) -> Callable[[str], Machine]:
     def made(centre: str) -> Machine:
-        (tmp_path / "two.urdf").write_text(TWO_LINKS.replace(CENTRE, centre))
-        (tmp_path / "two.yaml").write_text(
-            f"body: {{urdf: two.urdf, contacts: false}}\njoints:\n  one: {PATH}\n  two: {PATH}\n"
-        )
-        return Machine.load(tmp_path / "two.yaml")
+        return two_links(tmp_path, TWO_LINKS.replace(CENTRE, centre))
 
     return made
 

@@ -4,31 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from legged import TWO_LINKS, recorded, references
+from legged import recorded, references, two_links
 
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.case import Budget
+from rhythmid.diagnose.joints import joint_diagnosis
 from rhythmid.diagnose.joints.joint_case import diagnose_joint
 from rhythmid.diagnose.joints.link_exchange import exchanged, exchanges
 from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.identify.joints.joint_motion import JointBalances
 
-PATH = (
-    "{command: [{input_delay: {delay: 0.0}}, {position_control: {proportional: {value: 80, fixed: true}, "
-    "derivative: {value: 2.0, fixed: true}}}], force: [{viscous_damper: {damping: 0.1}}]}"
-)
-
 
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory) -> Machine:
-    folder = tmp_path_factory.mktemp("arm")
-    (folder / "two.urdf").write_text(TWO_LINKS)
-    (folder / "two.yaml").write_text(
-        f"body: {{urdf: two.urdf, contacts: false}}\njoints:\n  one: {PATH}\n  two: {PATH}\n"
-    )
-    return Machine.load(folder / "two.yaml")
+    return two_links(tmp_path_factory.mktemp("arm"))
 
 
 def finding(parameter: str, corrected: Machine) -> WrongLink:
@@ -87,3 +78,25 @@ def test_an_exchange_takes_a_change_away_or_puts_one_with_no_more_numbers_in_the
     ]
     alone = {"a.mass": ("a", "mass")}
     assert {} not in exchanges(alone, counts)
+
+
+def test_a_diagnosis_fits_the_corrections_together_and_searches_the_joints_again(
+    arm: Machine, monkeypatch: pytest.MonkeyPatch
+):
+    time, rng = np.arange(0.0, 4.0, 0.002), np.random.default_rng(4)
+    moves = references({"one": (0.5, 0.4), "two": (0.7, 0.4)}, time, rng, (0.3, 2.0))
+    own = {name: arm.body.own(name) for name in ("upper", "lower")}
+    mass = 1.1 * own["lower"].mass
+    record = replace(recorded(arm.with_inertial({"lower.mass": mass}), moves, time, rng), sampled="mean")
+    first = arm.with_inertial({"upper.mass": 1.02 * own["upper"].mass})
+    second = first.with_centre("lower", 1.08 * own["lower"].centre)
+    one_by_one = iter([finding("upper.mass", first), finding("lower.centre_of_mass", second)])
+    monkeypatch.setattr(joint_diagnosis, "likely_link", lambda *_: next(one_by_one, None))
+    monkeypatch.setattr(joint_diagnosis, "likely_tilt", lambda *_: None)
+    catalogue = Catalogue({"viscous_damper": load_catalogue()["viscous_damper"]})
+    answer = joint_diagnosis.diagnose_machine([record], arm, catalogue=catalogue)
+    (found,) = [one for one in answer.diagnosis.missing if one.link]
+    assert (found.link, found.element) == ("lower", "link_mass")
+    assert answer.machine.body.own("lower").mass == pytest.approx(mass, rel=0.01)
+    assert answer.machine.body.own("upper").mass == own["upper"].mass
+    assert answer.diagnosis.joints["one"].verdict == "consistent"

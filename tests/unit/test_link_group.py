@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from legged import TWO_LINKS, recorded, references
+from legged import recorded, references, two_links
 
-from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.joints.joint_answer import JointEffect
@@ -16,19 +15,11 @@ from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.identify.joints.joint_motion import JointBalances
 
 NOISE = 3.0  # N*m, a tenth of the effort
-PATH = (
-    "{command: [{input_delay: {delay: 0.0}}, {position_control: {proportional: {value: 80, fixed: true}, "
-    "derivative: {value: 2.0, fixed: true}}}], force: [{viscous_damper: {damping: 0.1}}]}"
-)
 
 
 @pytest.fixture
 def arm(tmp_path):
-    (tmp_path / "two.urdf").write_text(TWO_LINKS)
-    (tmp_path / "two.yaml").write_text(
-        f"body: {{urdf: two.urdf, contacts: false, free: {{one.armature: {{}}}}}}\njoints:\n  one: {PATH}\n  two: {PATH}\n"
-    )
-    return Machine.load(tmp_path / "two.yaml")
+    return two_links(tmp_path, body=", free: {one.armature: {}}")
 
 
 @pytest.mark.parametrize(("swing", "alike"), [(0.0005, True), (0.6, False)])

@@ -4,26 +4,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from legged import TWO_LINKS, recorded, references
+from legged import recorded, references, two_links
 
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
 from rhythmid.elements.catalogue import load_catalogue
 
-PATH = (
-    "{command: [{input_delay: {delay: 0.0}}, {position_control: {proportional: {value: 80, fixed: true}, "
-    "derivative: {value: 2.0, fixed: true}}}], force: [{viscous_damper: {damping: 0.1}}]}"
-)
 CARRIED = 0.1  # kg
 
 
 @pytest.fixture
 def arm(tmp_path: Path) -> Machine:
-    (tmp_path / "two.urdf").write_text(TWO_LINKS)
-    (tmp_path / "two.yaml").write_text(
-        f"body: {{urdf: two.urdf, contacts: false}}\njoints:\n  one: {PATH}\n  two: {PATH}\n"
-    )
-    return Machine.load(tmp_path / "two.yaml")
+    return two_links(tmp_path)
 
 
 def diagnosed(plant: Machine, nominal: Machine):

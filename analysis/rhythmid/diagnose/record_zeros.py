@@ -4,8 +4,7 @@ A zero of each record is a hypothesis like any other. It is not missing physics,
 stiffness, the mean of a motion shifts with its amplitude. The zeros are therefore adopted, for all hypotheses alike, only if they
 predict data that the fit has not seen decisively better, both beside the nominal model and beside the effect of the catalogue that
 explains the records best. The model with both must also follow the machine: a zero is a calibration, and must not compensate for a
-machine that has changed from record to record. The output is linear in its zeros, so that beside the nominal model first-order
-cross-validation is exact in them. Beside the effect, both are fitted together.
+machine that has changed from record to record.
 """
 
 from collections.abc import Mapping, Sequence

@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rhythmid.diagnose.baseline import Calibration, calibrate
 from rhythmid.diagnose.calibration_evidence import Seen
@@ -27,11 +28,10 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.report.quantity import with_std, with_written_unit
 
+Array = NDArray[np.float64]
 GAIN, OFFSET = "sensor_gain", "sensor_offset"
-CONTROLS = {
-    "position_control": "position",
-    "velocity_control": "velocity",
-}  # what each controller makes follow
+# the quantity that each controller makes follow its reference
+CONTROLS = {"position_control": "position", "velocity_control": "velocity"}
 
 
 def with_reference_scale(
@@ -52,9 +52,7 @@ def with_reference_scale(
         alone.extended(FreeFunction("offset", (offset,))),
     ):
         return calibration
-    tell(
-        "the measurement seems to have another scale than the reference; looking for an effect that says the same"
-    )
+    tell("the measurement seems to be scaled; looking for an effect that says the same")
     known = catalogue.within(scales(series, fit.model))
     explained = Seen.of(search(series, fit, given, known, pool, tell, most=1).fit, pool)
     law = explained.fit.model
@@ -85,7 +83,7 @@ def _scaled(model: Model, catalogue: Catalogue) -> Model:
     return model.with_element(catalogue[GAIN], {"gain": 1.0}).with_element(catalogue[OFFSET], {"offset": 0.0})
 
 
-def _columns(fit: Fit) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
+def _columns(fit: Fit) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     """A constant and the model's output, as signals of each series."""
     made = zip(fit.residuals, fit.run.series, strict=True)
     outputs = tuple(one.averaged - residual for residual, one in made)

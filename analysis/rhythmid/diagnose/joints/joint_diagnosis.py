@@ -208,10 +208,17 @@ def _explained(
     A correction takes about so many seconds.
     """
     links: dict[str, WrongLink] = {}
-    unseen = JointBalances.of(machine, holdout, balances) if holdout else None
-    delay = reference_delay(balances, balances.computed) if balances.computed else None
+
+    def searched(
+        joints: Sequence[str], end: float = EXPLAINED
+    ) -> tuple[ReferenceDelay | None, dict[str, JointResult], dict[str, str]]:
+        """The delay of the references and the results of joints, of the machine and the balances as they are now."""
+        unseen = JointBalances.of(machine, holdout, balances) if holdout else None
+        delay = reference_delay(balances, balances.computed) if balances.computed else None
+        return delay, *_searched(balances, unseen, joints, catalogue, tell, budget, delay, end)
+
     joints = [joint for joint in machine.joints if joint not in unsigned]
-    found, refused = _searched(balances, unseen, joints, catalogue, tell, budget, delay, SEARCHED)
+    delay, found, refused = searched(joints, SEARCHED)
     refused, given = {**unsigned, **refused}, found
     most = max(MOST_LINKS, len(machine.body.links))
     tilt: BaseTilt | None = None
@@ -251,9 +258,7 @@ def _explained(
             break
         if shared is not None:
             tell(shared.words)
-        unseen = JointBalances.of(machine, holdout, balances) if holdout else None
-        delay = reference_delay(balances, balances.computed) if balances.computed else None
-        better, refused_now = _searched(balances, unseen, again, catalogue, tell, budget, delay)
+        delay, better, refused_now = searched(again)
         found, refused = {**found, **better}, {**refused, **refused_now}
     if len(links) > 1 and budget.allows(correction, WEIGHED):
         tell("fitting the changes of all links together")
@@ -261,9 +266,8 @@ def _explained(
             changed = {split(parameter)[0] for parameter in links}
             links, machine = together, next(iter(together.values())).corrected
             balances = JointBalances.of(machine, records, balances)
-            unseen = JointBalances.of(machine, holdout, balances) if holdout else None
             again = [joint for joint in found if any(feels(balances, joint, link) for link in changed)]
-            better, refused_now = _searched(balances, unseen, again, catalogue, tell, budget, delay)
+            delay, better, refused_now = searched(again)
             found, refused = {**found, **better}, {**refused, **refused_now}
     return _Explained(machine, found, refused, links, balances.leads, delay, tilt, gears, given)
 
@@ -301,7 +305,7 @@ def _values_of_links(found: Mapping[str, JointResult], known: set[str]) -> dict[
 
 def _searched(
     balances: JointBalances, unseen: JointBalances | None, joints: Sequence[str], catalogue: Catalogue,
-    tell: Tell, budget: Budget, delay: ReferenceDelay | None, end: float = EXPLAINED,
+    tell: Tell, budget: Budget, delay: ReferenceDelay | None, end: float,
 ) -> tuple[dict[str, JointResult], dict[str, str]]:  # fmt: skip
     """The results of joints, and the reasons for those that cannot be judged. They share the time until this share of the budget has passed:
     each has the same part of what those before it have left, in which it is also weighed."""
