@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.inversion import Inversions, followed, inverted
+from rhythmid.identify.inverse_dynamics.motion import low_pass
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
@@ -65,6 +67,33 @@ def test_in_a_dead_band_and_beyond_a_limit_it_is_what_goes_in_to_first_order():
     found = inverted(dead, WAVE, False).into
     np.testing.assert_allclose(found[within], (2 * WAVE - dead(WAVE))[within])
     np.testing.assert_allclose(dead(found)[clear], WAVE[clear], atol=1e-4)
+
+
+def test_what_goes_into_a_lag_is_found_though_the_signal_has_parts_that_are_fast_beside_it():
+    wanted = WAVE + 0.1 * np.random.default_rng(1).normal(size=len(TIME))
+    keeps = np.exp(-0.002 / 0.01)
+
+    def lagging(signal, keeps=keeps):
+        return lfilter([0.5 * (1.0 - keeps), 0.5 * (1.0 - keeps)], [1.0, -keeps], signal)
+
+    slow = np.clip(TIME, 0.0, 1.0) * low_pass(wanted, 0.002, 25.0)
+    found = inverted(lagging, slow, remembers=True)
+    error = lagging(found.into) - slow
+    assert np.linalg.norm(error) < 1e-2 * np.linalg.norm(slow)
+    moved = followed(found, lambda signal: lagging(signal, keeps + 1e-4), slow, remembers=True)
+    anew = inverted(lambda signal: lagging(signal, keeps + 1e-4), slow, remembers=True)
+    assert np.linalg.norm(moved.into - anew.into) < 0.1 * np.linalg.norm(anew.into - found.into)
+
+
+def test_what_goes_into_a_limit_of_the_rate_is_told_to_first_order():
+    def limited(signal):
+        made, last = np.empty_like(signal), 0.0
+        for place, value in enumerate(signal):
+            made[place] = last = last + float(np.clip(value - last, -1e-3, 1e-3))
+        return made
+
+    found = inverted(limited, WAVE[:2000], remembers=True)
+    np.testing.assert_allclose(found.into, 2.0 * WAVE[:2000] - limited(WAVE[:2000]))
 
 
 @pytest.mark.parametrize("coefficient", [0.05, 0.15, 0.3])
