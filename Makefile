@@ -20,7 +20,8 @@ $(VENV)/.requirements: requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' 2>/dev/null || \
 		{ echo "error: rhythmid needs Python 3.11 or 3.12, and $(PYTHON) is not one; try: make $(or $(MAKECMDGOALS),install) PYTHON=python3.12" >&2; exit 2; }
 	$(PYTHON) -m venv --clear $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements.lock
+	@# what is used is compiled when it is imported: all of it takes longer than a test run gains
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --requirement requirements.lock
 	@touch $@
 
 $(VENV)/.packages: $(VENV)/.requirements $(METADATA)

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import settings
 from patience import LONG
 
-from rhythmid import cli
+from rhythmid import cli, parallel
 
 os.environ.setdefault(
     "OMP_NUM_THREADS", "1"
@@ -42,12 +42,22 @@ def pytest_configure(config: pytest.Config) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(config, "cache", None) is not None:
         os.environ.setdefault("RHYTHMID_CACHE", str(config.cache.mkdir("compiled")))
+    if (
+        "PYTEST_XDIST_WORKER" in os.environ
+    ):  # whose processors are all in use: further processes would load all code again
+        parallel.cores = lambda: 1
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the files that take longest, so that of two workers neither ends long after the other."""
     places = {name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: places.get("/".join(item.path.parts[-2:]), len(LONGEST)))
+
+
+@pytest.fixture
+def processors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two processors, for what a diagnosis in several processes promises."""
+    monkeypatch.setattr(parallel, "cores", lambda: 2)
 
 
 @pytest.fixture
