@@ -31,6 +31,7 @@ from rhythmid.diagnose.joints.stated_fit import stated_parameters
 from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.joints.common_stamps import with_common_stamps
 from rhythmid.identify.joints.held_reference import balances_of, likely_readings
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_plausibility import check_joints
@@ -208,6 +209,7 @@ def _explained(
     A correction takes about so many seconds.
     """
     links: dict[str, WrongLink] = {}
+    balances = with_common_stamps(balances)
 
     def searched(
         joints: Sequence[str], end: float = EXPLAINED

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from rhythmid.body.inertial_parameter import CENTRE, LOAD, MASS, MOMENT, PAYLOAD, TURNING, split
 from rhythmid.body.link_inertia import Principal, about_centre, point_mass, ten_of
 from rhythmid.body.machine import Machine
-from rhythmid.diagnose.constants import CONTRADICTS, PRACTICAL_EFFORT
+from rhythmid.diagnose.constants import CONTRADICTS, EQUIVALENT
 from rhythmid.diagnose.joints.dry_friction import dry_in_place, laws_found
 from rhythmid.diagnose.joints.joint_case import OF_LINKS, JointResult
+from rhythmid.diagnose.joints.link_evidence import advantage
 from rhythmid.diagnose.joints.link_group import masses_alike
 from rhythmid.diagnose.joints.machine_cause import (
     Beside,
@@ -33,7 +34,6 @@ from rhythmid.diagnose.joints.machine_cause import (
 )
 from rhythmid.diagnose.joints.wrong_link import WrongLink, values_of
 from rhythmid.diagnose.rejections import decisive
-from rhythmid.identify.inverse_dynamics.estimate import variation_of
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
@@ -277,7 +277,7 @@ def likely_link(
     worthy = sorted((one for one in ranked if priced(one) > 0.0), key=lambda one: -priced(one))
     for link in dict.fromkeys(one.change.link for one in worthy):
         tried = [_tried(one, balances, found) for one in worthy if one.change.link == link]
-        best = _simplest(tried, balances, found)
+        best = _simplest(tried, found)
         if not best.moved or best.worth <= (0.0 if link in stated else price):
             continue
         if matters(best.change.imposed(best.fit.numbers, best.fit.paths), balances, found):
@@ -287,21 +287,21 @@ def likely_link(
     return None
 
 
-def _simplest(tried: Sequence[_Tried], balances: JointBalances, found: Mapping[str, JointResult]) -> _Tried:
-    """The change that is worth most. All ten numbers of a link also explain what filters and laws of friction leave; where they leave no less of any
-    effort by a practical size, a change with fewer numbers is taken."""
+def _simplest(tried: Sequence[_Tried], found: Mapping[str, JointResult]) -> _Tried:
+    """The change that is worth most, or the best one with fewer numbers that predicts as well, within the standard error of the difference between
+    blocks of the records: more numbers of a link also explain what filters and laws of friction leave."""
     best = max(tried, key=lambda one: one.worth)
-    if best.change.kind != LOAD:
-        return best
-
-    def leaves_more(one: _Tried, joint: str) -> bool:
-        size = variation_of(balances.balance(joint, found[joint].late))
-        more = one.fit.errors[joint] ** 2 - best.fit.errors[joint] ** 2
-        return math.sqrt(max(more, 0.0)) > PRACTICAL_EFFORT * size
-
-    others = [one for one in tried if one is not best]
-    alike = [one for one in others if not any(leaves_more(one, joint) for joint in found)]
+    fewer = [one for one in tried if len(one.fit.numbers) < len(best.fit.numbers)]
+    alike = [one for one in fewer if _as_good(one, best, found)]
     return max(alike, key=lambda one: one.worth, default=best)
+
+
+def _as_good(one: _Tried, best: _Tried, found: Mapping[str, JointResult]) -> bool:
+    """Whether a change predicts as well as the `best` one, which has more numbers."""
+    made = [advantage(result, best.fit.best[joint], one.fit.best[joint]) for joint, result in found.items()]
+    gain, error = sum(more for more, _ in made), math.hypot(*(error for _, error in made))
+    more = len(best.fit.numbers) - len(one.fit.numbers)
+    return gain - decisive(1) * more <= EQUIVALENT * error
 
 
 def _wrong(

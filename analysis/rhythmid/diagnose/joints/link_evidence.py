@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from rhythmid.body.body import BODY
 from rhythmid.diagnose.effort.fitted import Fitted
-from rhythmid.diagnose.evidence import predict
+from rhythmid.diagnose.evidence import difference, predict
+from rhythmid.diagnose.hypothesis import Prediction
 from rhythmid.diagnose.joints.joint_case import JointResult
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -79,28 +80,49 @@ def gain_of(
     hypotheses: Sequence[Fitted],
     before: tuple[Model, Balance],
     after: tuple[Model, Balance],
-) -> float:
-    """Log odds of a joint for the values of the body `after` against those `before`, each a nominal path and its balance.
+) -> tuple[float, Fitted]:
+    """Log odds of a joint for the values of the body `after` against those `before`, each a nominal path and its balance, and what is best there.
 
     Each side has the best of these hypotheses, of which an effect costs what any addition has to gain in a search: a value of a link
     that needs another effect at a joint beside it explains less than one that needs none.
     """
-    scores = _net_scores(one, hypotheses, (before, after))
-    return 0.0 if scores is None else float(scores[1].max() - scores[0].max())
+    sides = [_moved(one, fitted, *side) for side in (before, after) for fitted in hypotheses]
+    net = _net_scores(one, sides)
+    first = len(hypotheses)
+    best = first + int(net[first:].argmax())
+    return float(net[best] - net[:first].max()), sides[best]
 
 
-def _net_scores(
-    one: JointResult, hypotheses: Sequence[Fitted], sides: Sequence[tuple[Model, Balance]]
-) -> Array | None:
-    """Log scores (sides, hypotheses) less the price of the effects; None where the sides do not have the same rows."""
-    fits = [_moved(one, fitted, *side).linearised for side in sides for fitted in hypotheses]
-    if len({len(fit.residual) for fit in fits}) > 1:
+def advantage(one: JointResult, first: Fitted, second: Fitted) -> tuple[float, float]:
+    """Log odds of a joint for the first of two hypotheses against the second, beside different values of the body, and their standard error
+    from the blocks of the records."""
+    predictions = _predictions(one, [first, second])
+    if predictions is None:
+        return 0.0, 0.0
+    gain, error = difference(*predictions)
+    return gain - _price(one) * (len(first.elements) - len(second.elements)), error
+
+
+def _net_scores(one: JointResult, fits: Sequence[Fitted]) -> Array:
+    """Log scores (h,) less the price of the effects; zeros where not all have the same rows."""
+    predictions = _predictions(one, fits)
+    if predictions is None:
+        return np.zeros(len(fits))
+    prices = [_price(one) * len(fitted.elements) for fitted in fits]
+    return np.array([each.score for each in predictions]) - np.array(prices)
+
+
+def _predictions(one: JointResult, fits: Sequence[Fitted]) -> list[Prediction] | None:
+    """What hypotheses about a joint predict; None where they do not have the same rows."""
+    linearised, search = [fitted.linearised for fitted in fits], one.result.search
+    if len({len(fit.residual) for fit in linearised}) > 1:
         return None
-    price = decisive(one.result.contest.candidates)
-    search = one.result.search
-    scores = [each.score for each in predict(fits, search.blocks, search.balance.record)]
-    prices = [price * len(fitted.elements) for fitted in hypotheses]
-    return np.reshape(scores, (len(sides), len(hypotheses))) - np.array(prices)
+    return predict(linearised, search.blocks, search.balance.record)
+
+
+def _price(one: JointResult) -> float:
+    """What an effect of a joint's search has to gain [nat]."""
+    return decisive(one.result.contest.candidates)
 
 
 def _moved(one: JointResult, fitted: Fitted, nominal: Model, balance: Balance) -> Fitted:

@@ -79,8 +79,8 @@ class Cause(Numbers, Protocol):
 @dataclass(frozen=True, eq=False)
 class Weighed:
     """The numbers (k,) of a cause with their `covariance` (k, k), the `paths` of the joints that were fitted beside them, the log odds of all
-    joints for it (`weight`), the joint that shows it best (`shown`), and what it explains of that joint's mismatch (`share`). `errors` is what is then left
-    of the effort of each joint."""
+    joints for it (`weight`), the joint that shows it best (`shown`), and what it explains of that joint's mismatch (`share`). `best` is the hypothesis of
+    each joint that predicts best beside it."""
 
     numbers: Array
     covariance: Array
@@ -88,7 +88,7 @@ class Weighed:
     weight: float
     shown: str
     share: float
-    errors: Mapping[str, float]
+    best: Mapping[str, Fitted]
 
     @property
     def probability(self) -> float:
@@ -130,18 +130,19 @@ def weighed(
     With and without the cause each joint has the best of its `rivals` and of the hypothesis beside the cause.
     """
     paths = {joint: beside[joint].fit.model if joint in beside else balances.models[joint] for joint in found}
-    numbers, covariance, fitted, errors = _fitted(cause, balances, found, paths, list(judges), start)
+    numbers, covariance, fitted = _fitted(cause, balances, found, paths, list(judges), start)
     gains: dict[str, float] = {}
+    best: dict[str, Fitted] = {}
     after = cause.in_place(numbers, fitted)
     for joint, one in found.items():
         sides = ((side.models[joint], side.balance(joint, one.late)) for side in (balances, after))
         parts = rivals(one)
         parts += [beside[joint]] if joint in beside and beside[joint] not in parts else []
-        gains[joint] = gain_of(one, parts, *sides)
+        gains[joint], best[joint] = gain_of(one, parts, *sides)
     shown = max(judges, key=lambda joint: gains[joint])
     weight = sum(gain if joint in judges else min(gain, 0.0) for joint, gain in gains.items())
     share = _share(found[shown], balances, after, fitted[shown])
-    return Weighed(numbers, covariance, fitted, weight, shown, share, errors)
+    return Weighed(numbers, covariance, fitted, weight, shown, share, best)
 
 
 def _share(one: JointResult, before: JointBalances, after: JointBalances, path: Model) -> float:
@@ -317,11 +318,10 @@ def _information(options: Options, slopes: Array) -> Array:
 def _fitted(
     cause: Cause, balances: JointBalances, found: Mapping[str, JointResult], paths: Mapping[str, Model], judges: Sequence[str],
     start: Array,
-) -> tuple[Array, Array, dict[str, Model], dict[str, float]]:  # fmt: skip
-    """The numbers that fit best beside these paths, their covariance, the fitted paths and their errors; paths and numbers are fitted in turn, from a
+) -> tuple[Array, Array, dict[str, Model]]:  # fmt: skip
+    """The numbers that fit best beside these paths, their covariance, and the fitted paths; paths and numbers are fitted in turn, from a
     `start` (k,) of the numbers, until they settle."""
     numbers, covariance = start, np.diag(cause.spreads**2)
-    errors: dict[str, float] = {}
     fitted = {
         joint: one.result.nominal.fit.model if paths[joint] is balances.models[joint] else paths[joint]
         for joint, one in found.items()
@@ -336,7 +336,6 @@ def _fitted(
             for joint, one in found.items()
         }
         fitted = {joint: fit.model for joint, fit in fits.items()}
-        errors = {joint: fit.error for joint, fit in fits.items()}
         columns = cause.columns(now, numbers, fitted)
         weighted = [
             rows_of(now.balance(joint, found[joint].late), fits[joint], columns[joint]) for joint in judges
@@ -344,7 +343,7 @@ def _fitted(
         numbers, covariance = refined(weighted, cause, before)
         if np.all(np.abs(numbers - before) <= SETTLED * np.sqrt(np.diag(covariance))):
             break
-    return numbers, covariance, fitted, errors
+    return numbers, covariance, fitted
 
 
 def refined(rows: Sequence[WeightedRows], cause: Numbers, start: Array) -> tuple[Array, Array]:

@@ -55,6 +55,7 @@ class Balance:
     stick_speed : speed below which samples are left out.
     stuck : share of the rows that were left out for this reason.
     period : sample period [s] of motion or recorded effort, whichever is longer: the unit of the alignment.
+    aligned : standard deviation [s] of the alignment where more is known of it than that stamps are rounded to a sample.
     fits : the latest fits to these rows, by all that they depend on.
     """
 
@@ -66,6 +67,7 @@ class Balance:
     stick_speed: float
     stuck: float
     period: float
+    aligned: float | None = None
     _forces: dict[Hashable, Array] = field(default_factory=dict, repr=False)
     _sensitive: dict[str, bool] = field(default_factory=dict, repr=False)
     fits: dict[Hashable, Any] = field(init=False, default_factory=dict, repr=False)  # a copy has none

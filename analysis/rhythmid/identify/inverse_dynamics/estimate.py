@@ -56,8 +56,9 @@ class Alignment:
 
     @classmethod
     def of(cls, balance: Balance) -> "Alignment":
-        """One sample of motion or effort, whichever is longer, as standard deviation, two as limit."""
-        return cls(ALIGNED * balance.period, -FARTHEST * balance.period, FARTHEST * balance.period)
+        """One sample of motion or effort, whichever is longer, as standard deviation unless more is known, and two as limit."""
+        std = ALIGNED * balance.period if balance.aligned is None else balance.aligned
+        return cls(std, -FARTHEST * balance.period, FARTHEST * balance.period)
 
 
 @dataclass(frozen=True, eq=False)

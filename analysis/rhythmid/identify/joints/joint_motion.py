@@ -53,7 +53,7 @@ class JointBalances:
     `leads` [s] of other joints are the leads of references in their recorded efforts, already removed from the
     motions. `rotor_like` holds by joint the link parameters with the same effect there as the rotor's inertia, with
     the inertia [kg m²] per unit of each. `refuted` holds pairs of a joint and a link's parameter that is not freed
-    there, because the other joints refute its estimate. `gears` are the joints whose gears yield: there `bodies` are the
+    there, because the other joints refute its estimate. `aligned` [s] are the standard deviations of the alignments of joints. `gears` are the joints whose gears yield: there `bodies` are the
     motions of the links, and `motions` those of the encoders.
     """
 
@@ -68,6 +68,7 @@ class JointBalances:
     rotor_like: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     refuted: frozenset[tuple[str, str]] = frozenset()
     gears: Mapping[str, ElasticGear] = field(default_factory=dict)
+    aligned: Mapping[str, float] = field(default_factory=dict)
     # of these balances alone: a copy with other motions has none
     _made: dict[tuple[str, float], Balance] = field(init=False, default_factory=dict, repr=False)
 
@@ -118,7 +119,8 @@ class JointBalances:
         )
         computed = tuple(joint for joint in machine.joints if joint in stretches[0].reference)
         made = cls(
-            machine, models, motions, bandwidths, bodies, period, computed, rotor_like=rotor_like, refuted=refuted
+            machine, models, motions, bandwidths, bodies, period, computed, rotor_like=rotor_like, refuted=refuted,
+            aligned=alike.aligned if alike else {},
         )  # fmt: skip
         return made.with_leads(alike.leads).with_gears(alike.gears) if alike else made
 
@@ -191,9 +193,8 @@ class JointBalances:
             motions = self.motions[joint]
             if late != 0.0:
                 motions = [_later(motion, self.models[joint], late) for motion in motions]
-            self._made[joint, late] = JointBalance.of_motions(
-                motions, self.bandwidths[joint], self.period, CLEAR
-            )
+            made = JointBalance.of_motions(motions, self.bandwidths[joint], self.period, CLEAR)
+            self._made[joint, late] = replace(made, aligned=self.aligned.get(joint))
         return self._made[joint, late]
 
 
