@@ -43,9 +43,8 @@ def pytest_configure(config: pytest.Config) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(config, "cache", None) is not None:
         os.environ.setdefault("RHYTHMID_CACHE", str(config.cache.mkdir("compiled")))
-    if (
-        "PYTEST_XDIST_WORKER" in os.environ
-    ):  # whose processors are all in use: further processes would load all code again
+    # the processors are in use by the other workers, and each further process would load the compiled models again
+    if "PYTEST_XDIST_WORKER" in os.environ:
         parallel.cores = lambda: 1
 
 
