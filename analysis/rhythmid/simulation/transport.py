@@ -76,7 +76,7 @@ class CommandPath:
 def command_delay(model: Model, stamps: Array) -> Array | None:
     """Delays (n,) [s] of commands stamped `stamps` [s]; None where the command path has no delay."""
     late = acting_delay(model, stamps)
-    return np.full(len(stamps), late) if isinstance(late, float) else late
+    return late if late is None or isinstance(late, np.ndarray) else np.full(len(stamps), late)
 
 
 def acting_delay(model: Model, stamps: Array) -> Array | float | None:
@@ -87,7 +87,7 @@ def acting_delay(model: Model, stamps: Array) -> Array | float | None:
     if any(_varies(late) for late, _ in stages):
         late = stages[-1][1] - stamps
         return late if _varies(late) else float(late[0])
-    return sum((float(late[0]) for late, _ in stages if len(late)), 0.0)
+    return float(sum(float(late[0]) for late, _ in stages if len(late)))
 
 
 def delayed_command(model: Model, command: PPoly | None) -> PPoly | None:
