@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 MOST_INVERSION_STEPS = 12  # most iterations: an error that halves each time is then below a thousandth
-# largest share of the error that a correction may leave: a rate limit, which cannot be inverted, leaves nearly all of it
-SETTLING = 0.5
+# largest share of the error that so many corrections may leave where an element remembers: a rate limit, which cannot be inverted, leaves
+# nearly all of it, a lag of a time constant that is six times as long as the shortest period over 2 pi a tenth
+SETTLING, FIRST = 0.5, 4
 # share of the error after a step below which the previous slopes are reused: new ones cost two evaluations
 FAST = 0.1
 EXACT = 1e-6  # relative accuracy of an inversion
+CLOSE = 1e-2  # that of the difference of two inversions, for a derivative
 # smallest share of a step that is tried: enough for a slope that grows fivefold along the step
 LEAST_SHARE = 0.2
 SECANT = 1e-3  # step of the finite difference for a slope, relative to the signal
@@ -36,35 +38,55 @@ def inverted(
 ) -> Inverted:
     """Input (n,) whose output is `wanted` (n,).
 
-    Where the output depends on the same instant alone, Newton steps are taken at each instant. Where the element
-    `remembers`, the error is subtracted from the input repeatedly as long as this converges. In a dead band or
-    beyond a limit, where the output does not respond, the result is the input to first order.
+    Where the output depends on the same instant alone, Newton steps are taken at each instant; where the element `remembers`, those of
+    `_of_past`. In a dead band or beyond a limit, where the output does not respond, the result is the input to first order.
     """
     into, error = wanted, wanted - comes_out(wanted)
     first_order, least = wanted + error, EXACT * np.linalg.norm(wanted)
+    if remembers:
+        found = _of_past(comes_out, wanted, into, error, float(least))
+        return Inverted(first_order, wanted - comes_out(first_order)) if found is None else found
     slope: Array | None = None
     share = np.ones(len(wanted))  # share of a step, halved where the step overshoots because the slope grows
-    reached = np.ones(len(wanted), dtype=bool)  # whether the wanted output is reachable
     for _ in range(MOST_INVERSION_STEPS):
-        step = error
-        if not remembers:
-            slope = _slope(comes_out, into) if slope is None else slope
-            reached = slope != 0.0
-            step = share * np.divide(error, slope, out=np.zeros_like(error), where=reached)
+        slope = _slope(comes_out, into) if slope is None else slope
+        reached = slope != 0.0  # whether the wanted output is reachable
+        step = share * np.divide(error, slope, out=np.zeros_like(error), where=reached)
         left = wanted - comes_out(into + step)
         if np.linalg.norm(left[reached]) > FAST * np.linalg.norm(error[reached]):
             slope = None  # the last slope converges too slowly
-        if remembers:
-            nearer = np.full(len(wanted), np.linalg.norm(left) < SETTLING * np.linalg.norm(error))
-        else:
-            nearer = np.abs(left) < np.abs(error)
+        nearer = np.abs(left) < np.abs(error)
         into, error = np.where(nearer, into + step, into), np.where(nearer, left, error)
         share = np.where(nearer, 1.0, 0.5 * share)
-        stands = not nearer.any() and (remembers or share.max() < LEAST_SHARE)
+        stands = not nearer.any() and share.max() < LEAST_SHARE
         if stands or np.linalg.norm(error[reached]) <= least:
             break
-    last = _slope(comes_out, into) if with_slope and not remembers else None
+    last = _slope(comes_out, into) if with_slope else None
     return Inverted(np.where(into == wanted, first_order, into), error, last)
+
+
+def _of_past(
+    comes_out: Callable[[Array], Array], wanted: Array, into: Array, error: Array, least: float
+) -> Inverted | None:
+    """Input (n,) for `wanted` (n,) from a first `into` (n,) with its `error` (n,); None where the output does not follow the input.
+
+    The errors of all inputs that were tried are combined to the smallest one, and the input of the combination is corrected by it (D. G. Anderson,
+    J. ACM 12 (1965) 547). To subtract only the last error would hardly change what is fast beside a lag.
+    """
+    inputs, errors, whole = [into], [error], float(np.linalg.norm(error))
+    for count in range(1, MOST_INVERSION_STEPS + 1):
+        if float(np.linalg.norm(error)) <= least:
+            break
+        if count > FIRST and float(np.linalg.norm(error)) > SETTLING * whole:
+            return None
+        inputs.append(into + error)
+        errors.append(wanted - comes_out(inputs[-1]))
+        apart = np.column_stack([one - errors[0] for one in errors[1:]])
+        shares = np.linalg.lstsq(apart, -errors[0], rcond=EXACT)[0]
+        into = inputs[0] + np.column_stack([one - inputs[0] for one in inputs[1:]]) @ shares
+        error = errors[0] + apart @ shares
+    error = wanted - comes_out(into)
+    return Inverted(into, error) if float(np.linalg.norm(error)) <= SETTLING * whole else None
 
 
 def followed(
@@ -72,7 +94,11 @@ def followed(
 ) -> Inverted:
     """Input (n,) for `wanted` (n,) where both differ little from those of a `known` inversion: to first order, with
     one evaluation of the output. A full inversion is made where the output does not respond somewhere, or where the
-    slope is unknown."""
+    slope is unknown. Where the element `remembers`, the small difference is inverted."""
+    if remembers:
+        target, error = wanted - known.error, wanted - known.error - comes_out(known.into)
+        least = CLOSE * float(np.linalg.norm(error))
+        return _of_past(comes_out, target, known.into, error, least) or inverted(comes_out, wanted, remembers)
     if known.slope is None or not known.slope.all():
         return inverted(comes_out, wanted, remembers)
     step = (wanted - comes_out(known.into) - known.error) / known.slope
