@@ -20,7 +20,8 @@ $(VENV)/.requirements: requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' 2>/dev/null || \
 		{ echo "error: rhythmid needs Python 3.11 or 3.12, and $(PYTHON) is not one; try: make $(or $(MAKECMDGOALS),install) PYTHON=python3.12" >&2; exit 2; }
 	$(PYTHON) -m venv --clear $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements.lock
+	@# a module is compiled when it is first imported: most never are
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --requirement requirements.lock
 	@touch $@
 
 $(VENV)/.packages: $(VENV)/.requirements $(METADATA)

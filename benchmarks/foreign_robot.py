@@ -27,7 +27,7 @@ import numpy as np
 import yaml
 
 from rhythmid.diagnose.diagnosis import diagnose
-from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.elements.catalogue import Catalogue
 from rhythmid.model import Model
 from rhythmid.record.bag import Bag
 from rhythmid.record.read import read_record
@@ -131,10 +131,12 @@ def record(
         return np.load(log)
 
 
-def answer(bag: Path, command_type: str = "Float64MultiArray") -> dict[str, Any]:
-    """The diagnosis of a bag, as JSON has it."""
-    return diagnose([read_record(bag, signals(command_type))], Model.load(ROBOT / "nominal.yaml"), (),
-                    load_catalogue()).diagnosis.to_dict()  # fmt: skip
+def answer(
+    bag: Path, command_type: str = "Float64MultiArray", catalogue: Catalogue | None = None
+) -> dict[str, Any]:
+    """The diagnosis of a bag, as JSON has it, with the laws of a catalogue."""
+    record = read_record(bag, signals(command_type))
+    return diagnose([record], Model.load(ROBOT / "nominal.yaml"), (), catalogue).diagnosis.to_dict()
 
 
 def signals(command_type: str) -> Signals:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import settings
 from patience import LONG
 
-from rhythmid import cli
+from rhythmid import cli, parallel
 
 os.environ.setdefault(
     "OMP_NUM_THREADS", "1"
@@ -25,12 +25,13 @@ LONGEST = (  # files that take more than about twenty seconds of the processor
     "ros/test_run.py", "ros/test_foreign_robot.py", "ros/test_tour.py", "ros/test_testing.py", "ros/test_realtime_delays.py",
     "ros/test_lockstep_run.py",
     "ros/test_workspace.py",
-    "unit/test_effort_search.py", "unit/test_element_recorded.py", "faults/test_bad_input.py", "proof/test_concealed.py",
+    "unit/test_effort_search.py", "unit/test_element_recorded.py", "faults/test_bad_input.py", "proof/test_machines.py",
     "unit/test_plausibility.py", "faults/test_diagnose_bad_input.py", "unit/test_twin_diagnosis.py", "unit/test_tick_interval.py",
     "unit/test_record_zeros.py", "unit/test_identifiability.py", "unit/test_identify_identify.py", "proof/test_draw.py",
     "faults/test_bad_records.py", "unit/test_link_evidence.py", "unit/test_packaging.py", "faults/test_interrupted.py",
     "unit/test_joint_plausibility.py", "unit/test_alternatives.py", "proof/test_notebooks.py", "unit/test_element_catalogue.py",
-    "unit/test_held_reference.py", "unit/test_scoring.py",
+    "unit/test_held_reference.py", "unit/test_scoring.py", "unit/test_timing.py", "unit/test_table1.py", "unit/test_tick_scan.py",
+    "unit/test_inner_delays.py", "unit/test_start_balance.py", "unit/test_reference_scale.py", "unit/test_diagnosis.py",
 )  # fmt: skip
 
 Command = Callable[..., subprocess.CompletedProcess[str]]
@@ -42,12 +43,21 @@ def pytest_configure(config: pytest.Config) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(config, "cache", None) is not None:
         os.environ.setdefault("RHYTHMID_CACHE", str(config.cache.mkdir("compiled")))
+    # the processors are in use by the other workers, and each further process would load the compiled models again
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        parallel.cores = lambda: 1
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the files that take longest, so that of two workers neither ends long after the other."""
     places = {name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: places.get("/".join(item.path.parts[-2:]), len(LONGEST)))
+
+
+@pytest.fixture
+def processors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two processors, for what a diagnosis in several processes promises."""
+    monkeypatch.setattr(parallel, "cores", lambda: 2)
 
 
 @pytest.fixture

@@ -63,13 +63,13 @@ def limited(record: Record, share: float) -> Record:
 # poor records
 
 
-@pytest.mark.parametrize("length", [0.6, 2.0])
+@pytest.mark.parametrize("length", [0.6, pytest.param(2.0, marks=pytest.mark.long)])
 def test_short_records_of_a_machine_that_lacks_nothing_get_no_name(plain, length):
     found = run([one.cut(2.0, 2.0 + length) for one in plain])
     assert found.verdict != "missing_physics" and found.missing == ()
 
 
-@pytest.mark.parametrize("length", [0.6, 2.0])
+@pytest.mark.parametrize("length", [pytest.param(0.6, marks=pytest.mark.long), 2.0])
 def test_short_records_get_no_wrong_name(rubbing, length):
     found = run([one.cut(2.0, 2.0 + length) for one in rubbing])
     assert {effect.element for effect in found.missing} <= {"coulomb_friction"}
@@ -81,6 +81,7 @@ def test_one_amplitude_forbids_no_answer(protocol):
     assert found.verdict in ("consistent", "undecided") and found.missing == ()
 
 
+@pytest.mark.usefixtures("processors")  # the same answer in several processes
 def test_what_one_amplitude_shows_clearly_is_named():
     machine = hopper().with_element(CATALOGUE["coulomb_friction"], {"force": 0.03, "transition": 0.002})
     found = run(records(machine, (CYCLE,), seed=4))
@@ -125,7 +126,13 @@ def refused(given: list[Record], *words: str, model: Model | None = None, **opti
 
 
 @pytest.mark.parametrize(
-    ("role", "factor"), [("output", 1000.0), ("output", 0.001), ("input", 1000.0), ("forcing", 1000.0)]
+    ("role", "factor"),
+    [
+        pytest.param("output", 1000.0, marks=pytest.mark.long),
+        ("output", 0.001),
+        ("input", 1000.0),
+        ("forcing", 1000.0),
+    ],
 )
 def test_a_unit_that_is_off_by_a_thousand_is_named_with_the_channel_and_the_scale(brief, role, factor):
     wrong = [scaled(one, role, factor) for one in brief]
@@ -147,7 +154,7 @@ def test_right_units_are_not_suspected_although_the_model_is_far_off(plain):
 
 
 def test_a_missing_input_beside_a_forcing_is_noted(brief):
-    found = run([replace(one, input=None) for one in brief])
+    found = run([replace(brief[0], input=None)])
     assert found.verdict != "consistent"
     assert any("no record has an input channel" in note for note in found.notes)
 

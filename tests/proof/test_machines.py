@@ -12,8 +12,10 @@ import twins
 from json_schema import conforming
 from twins import Twin
 
+from machines import only
 from rhythmid.diagnose.answer.compose_effort import NO_SENSOR
 from rhythmid.diagnose.diagnosis import Answer, diagnose
+from rhythmid.elements.catalogue import Catalogue
 from rhythmid.model import Model
 
 NAMED: dict[str, Callable[[], Twin]] = {
@@ -21,6 +23,12 @@ NAMED: dict[str, Callable[[], Twin]] = {
     "servo of which only command and motion are known": twins.servo,
     "free decay without any input": twins.decay,
 }
+KIN = {  # instead of the whole catalogue, every law of which would be compiled with a controller: what is like the effect
+    "servo of which only command and motion are known": only(
+        "actuator_saturation", "actuator_deadband", "actuator_lag", "actuator_rate_limit", "reference_rate_limit", "coulomb_friction",
+        "quadratic_drag", "cubic_stiffness", "command_lag", "sensor_lag",
+    )
+}  # fmt: skip
 NULLS: dict[str, Callable[[], Twin]] = {
     "joint": lambda: twins.joint(friction=0.0),
     "rig on a shaken base": lambda: twins.rig(cubic=0.0),
@@ -51,8 +59,8 @@ SLOW: dict[str, Callable[[], Twin]] = {
 }
 
 
-def examined(twin: Twin) -> Answer:
-    answer = diagnose(twin.records, Model.from_text(twin.nominal))
+def examined(twin: Twin, catalogue: Catalogue | None = None) -> Answer:
+    answer = diagnose(twin.records, Model.from_text(twin.nominal), catalogue=catalogue)
     conforming(answer.diagnosis)
     return answer
 
@@ -60,7 +68,7 @@ def examined(twin: Twin) -> Answer:
 @pytest.mark.parametrize("name", NAMED)
 def test_the_missing_effect_is_named_and_measured(name):
     twin = NAMED[name]()
-    result = examined(twin).diagnosis
+    result = examined(twin, KIN.get(name)).diagnosis
     assert result.verdict == "missing_physics"
     assert [effect.element for effect in result.missing] == [twin.lacks]
     for key, true in twin.truth.items():

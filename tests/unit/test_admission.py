@@ -61,6 +61,14 @@ def test_a_free_decay_needs_no_input_and_motion_that_hardly_decays_is_remarked_o
     assert admitted([swing(0.0)], (), FREE).records[0].name == "swing"
 
 
+def test_a_speed_that_coasts_down_decays():
+    """A machine that turns ever more slowly changes its speed as much at the end as at the start."""
+    slow = Record("coasting", Channel(TIME, 3.0 - 0.28 * TIME, "m/s"), output_kind="velocity")
+    assert check_driven([slow], FREE) is None
+    steady = replace(slow, output=Channel(TIME, 3.0 + 0.1 * np.sin(9.0 * TIME), "m/s"))
+    assert check_driven([steady], FREE) is not None
+
+
 def test_records_of_which_only_the_forcing_is_known_are_used_with_a_remark(given):
     alone = [replace(one, input=None) for one in given]
     said = check_driven(alone, hopper())

@@ -203,6 +203,10 @@ def test_a_last_column_that_only_some_rows_fill_may_be_missing_in_the_others(tmp
     np.testing.assert_allclose(table.column("tau"), TAU)
 
 
+def test_a_separator_after_the_last_name_names_no_column(tmp_path):
+    np.testing.assert_allclose(Table.load(write(tmp_path, ROWS, "t,q,tau,\n")).column("tau"), TAU)
+
+
 def test_a_heading_that_no_row_fills_names_no_columns(tmp_path):
     with pytest.raises(InputError, match="line 1 has 4 columns, the rows have 3"):
         Table.load(write(tmp_path, ROWS, "t,q,tau,Events\n")).column("q")

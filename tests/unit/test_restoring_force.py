@@ -1,11 +1,13 @@
 """A linear restoring force is a hypothesis wherever the nominal model has none, although no score shows it there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from machines import CATALOGUE
 from rhythmid.diagnose.search.restoring_force import is_restored, restoring_force
-from rhythmid.elements.candidates import NEVER_REVERSED, ONE_WAY, candidates
+from rhythmid.elements.candidates import DYING, NEVER_REVERSED, ONE_WAY, candidates
 from rhythmid.identify.descent import WHITE
 from rhythmid.identify.output_error import start_only
 from rhythmid.identify.record_scales import scales
@@ -71,3 +73,14 @@ def test_a_motion_that_never_comes_back_shows_no_way_before_sliding():
         found = candidates(CATALOGUE, free().setting, scales([turning(speed)], free()))
         assert all((found.not_tried.get(name) == NEVER_REVERSED) is not shown for name in hysteresis)
         assert any(element.name == "coulomb_friction" for element, _ in found.tried)
+
+
+def test_a_motion_that_meets_each_speed_once_shows_laws_of_its_speed_alone():
+    """What goes with the time or the past goes with the speed as well; not so where a loose part makes it swing."""
+    untold = ("second_mode", "viscoelastic_relaxation", "sensor_drift")
+    swinging = np.exp(-TIME) * (1.0 + 0.6 * np.sin(6.0 * TIME))
+    for speed, told in ((np.exp(-TIME), False), (swinging, True), (np.sin(6.0 * TIME), True)):
+        coasting = replace(turning(speed), command=None)
+        found = candidates(CATALOGUE, free().setting, scales([coasting], free()))
+        assert all((found.not_tried.get(name) == DYING) is not told for name in untold)
+        assert {"quadratic_drag", "coulomb_friction"} <= {element.name for element, _ in found.tried}

@@ -95,7 +95,9 @@ def doubt_of_sign(found: Start) -> bool:
     return any("with scale: -1 for the" in line for line in found.lines())
 
 
-@pytest.mark.parametrize("stiffness, dry", [(0.0, 0.0), (6.0, 0.0), (6.0, 0.3)])
+@pytest.mark.parametrize(
+    "stiffness, dry", [(0.0, 0.0), pytest.param(6.0, 0.0, marks=pytest.mark.long), (6.0, 0.3)]
+)
 def test_an_effort_of_the_opposite_sign_is_told_with_what_the_balance_explains(tmp_path, stiffness, dry):
     x = moved(FORCE, 0.05, 0.3, stiffness, dry)[0]
     right, wrong = begun(tmp_path, FORCE, x), begun(tmp_path, -FORCE, x)

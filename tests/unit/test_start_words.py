@@ -8,6 +8,7 @@ import pytest
 from foreign import joint_state, moved, roles_of, servo, tones
 
 from rhythmid.errors import InputError
+from rhythmid.start.meaning import words_of
 from rhythmid.start.start import guess, start
 
 TIME = np.arange(8000) * foreign.STEP
@@ -207,3 +208,8 @@ def test_the_effort_that_goes_best_with_the_output_is_doubted_where_it_hardly_do
     }
     doubts = guess(table(tmp_path, pos=X, **noise)).roles.choices["input"].doubts
     assert any("it hardly goes with the output (coherence 0.0" in doubt for doubt in doubts)
+
+
+def test_the_letter_of_an_array_of_named_signals_tells_nothing():
+    assert words_of('Y[2]."Model Root"/"Switch2"/"Out1"') == words_of('"Model Root"/"Switch2"/"Out1"')
+    assert words_of("q[2]") == ["q", "2"]

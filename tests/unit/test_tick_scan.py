@@ -51,7 +51,15 @@ def test_the_period_of_a_held_command_is_found_within_ten_microseconds(period):
     assert best[INPUT_DELAY] + 0.5 * best[PERIOD] == pytest.approx(mean, abs=1e-3)
 
 
-@pytest.mark.parametrize("period", [0.1710123, 0.1110123, 0.1040123, 0.0970123])
+@pytest.mark.parametrize(
+    "period",
+    [
+        0.1710123,
+        pytest.param(0.1110123, marks=pytest.mark.long),
+        pytest.param(0.1040123, marks=pytest.mark.long),
+        0.0970123,
+    ],
+)
 def test_ticks_hardly_faster_than_the_motion_are_found_by_a_model_that_is_a_little_wrong(period):
     series, start = recorded(period)
     off = held(

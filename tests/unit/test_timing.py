@@ -24,7 +24,7 @@ from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
 U, Y = "input_delay.delay", "measurement_delay.delay"
-SPEC = {"type": "chirp", "amplitude": 0.3, "band": [0, 7], "sweep": 12.0}
+SPEC = {"type": "chirp", "amplitude": 0.3, "band": [0, 7], "sweep": 8.0}
 DELAYS = (0.04, 0.055)
 
 

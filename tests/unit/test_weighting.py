@@ -59,7 +59,7 @@ def test_noise_that_is_added_to_the_output_is_weighted_by_its_colour() -> None:
     assert efficient_fit(fit).values.tolist() == fit.values.tolist()
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_what_comes_in_bursts_is_not_and_the_intervals_hold_the_truth(seed: int) -> None:
     true = {"linear_spring.stiffness": 200.0, "switched_damper.stance": 2.0, "input_delay.delay": 0.04}
     found = weighted_by_colour(seed, 0.06)

@@ -88,7 +88,9 @@ def check_driven(records: Sequence[Record], model: Model) -> str | None:
         drives = (record.input, record.forcing, record.reference, record.effort)
         if any(one is not None for one in drives):
             continue
-        sizes = [float(np.std(quarter)) for quarter in np.array_split(record.output.value, 4)]
+        # a speed is a motion also where it is constant
+        size = _rms if record.output_kind == "velocity" else np.std
+        sizes = [float(size(quarter)) for quarter in np.array_split(record.output.value, 4)]
         if sizes[-1] > DECAYS * sizes[0] and not np.all(np.diff(sizes) < 0.0):
             return (
                 f"{record.name}: has no input channel and is taken for a free motion, which hardly decays; if anything drives it, "
@@ -98,3 +100,7 @@ def check_driven(records: Sequence[Record], model: Model) -> str | None:
     if forced and all(record.input is None and record.effort is None for record in records):
         return "no record has an input channel: if anything but the forcing drove the machine, it counts as missing physics here"
     return None
+
+
+def _rms(value: Array) -> float:
+    return float(np.sqrt(np.mean(value**2)))

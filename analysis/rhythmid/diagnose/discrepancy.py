@@ -4,7 +4,12 @@ Every model lacks small effects: they are too small to be named, or the catalogu
 estimated parameters, and the scatter of the residual does not show it. The model's discrepancy (M. C. Kennedy,
 A. O'Hagan, J. R. Stat. Soc. B 63 (2001) 425) is therefore modelled as a random sum of the effects of the catalogue's
 candidates and of free functions of the motion. Each has its own size, normal about zero; all sizes have a common scale.
-The residual informs about this scale but does not fix it: an effect that it hardly shows may still be present. The scale is
+
+An effect counts as small if the model's parameters do not reproduce much of it: only that part is visible in the residual. The
+part that they reproduce, such as most of a quadratic drag beside a viscous damper, may be large. All effects therefore have the
+same expected visible part, not the same force.
+
+The residual informs about the scale but does not fix it: an effect that it hardly shows may still be present. The scale is
 therefore integrated out, with a half-Cauchy prior whose median is one standard deviation of the noise
 (A. Gelman, Bayesian Analysis 1 (2006) 515).
 """
@@ -19,7 +24,10 @@ Array = NDArray[np.float64]
 # of the noise in one direction to far beyond any residual
 SCALES = np.logspace(-2.0, 6.0, 49)
 ROWS = 20_000  # rows processed at once
-ROUNDING = 1e-6  # share of a candidate below which the part outside the parameters' span is rounding
+# share of a candidate's response outside the parameters' span up to which the two are observationally equivalent: the estimate then
+# means both together
+ABSORBED = 1e-3
+ROUNDING = 1e-6  # share of the visible parts below which a direction is rounding
 
 
 def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: Array) -> Array:
@@ -41,10 +49,11 @@ def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: A
     parts = (slice(first, first + ROWS) for first in range(0, rows, ROWS))
     design, residual = reduced((np.hstack([jacobian[s], candidates[s]]), residual[s]) for s in parts)
     jacobian, candidates = design[:, :parameters], design[:, parameters:]
-    size = np.linalg.norm(candidates, axis=0)
-    columns = candidates[:, size > 0.0] / size[size > 0.0]
     basis = orthonormal(jacobian)
-    left = columns - basis @ (basis.T @ columns)
+    left = candidates - basis @ (basis.T @ candidates)
+    whole, visible = np.linalg.norm(candidates, axis=0), np.linalg.norm(left, axis=0)
+    shows = visible > ABSORBED * whole
+    columns, left = candidates[:, shows] / visible[shows], left[:, shows] / visible[shows]
     rest = residual - basis @ (basis.T @ residual)
     free = rows - basis.shape[1] - left.shape[1]
     if free <= 0 or not left.shape[1]:

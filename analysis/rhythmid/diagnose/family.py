@@ -7,8 +7,7 @@ leave a small mismatch that the true law would not. Then each name is uncertain,
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rhythmid.diagnose.hypothesis import Hypothesis
-from rhythmid.diagnose.probability import chance_beside, chance_of_law
+from rhythmid.diagnose.probability import Names, chance_beside, chance_of_law
 from rhythmid.diagnose.selection import Contest
 
 LISTED = 0.01  # weight from which a law is listed: about the accuracy of a weight by the Bayesian bootstrap, see `DRAWS`
@@ -33,27 +32,19 @@ class MissingFamily:
 
 
 def families_of(
-    contest: Contest,
-    chosen: Hypothesis,
-    shares: Mapping[str, float],
-    weights: Mapping[tuple[str, ...], float],
-    left: float,
-    in_place: Mapping[str, tuple[float, float]],
-    size_errors: Mapping[str, float],
+    names: Names, shares: Mapping[str, float], left: float, size_errors: Mapping[str, float]
 ) -> tuple[MissingFamily, ...]:
     """Families of the chosen hypothesis' effects, the one with the largest share first.
 
     Parameters
     ----------
-    contest, chosen : all hypotheses, and the chosen one.
+    names : its effects, and how probable their names are. What an effect of another family removes may be due to this family.
     shares : shares of the mismatch that the effects explain, by label.
-    weights : weights of the hypotheses, by key.
     left : share of the mismatch that the chosen hypothesis is expected to leave.
-    in_place : for each of its effects the chance that it stands in the place of an unknown law, and the share of the mismatch
-        that it removes. What an effect of another family removes may be due to this family.
     size_errors : relative standard deviations of the effects' sizes, by label. For a family that of its effect with the largest
         share counts: an effect at a limit of its law may also be a law of another family.
     """
+    chosen = names.chosen
     labels: dict[str, list[str]] = {}
     for label, name in zip(chosen.elements, chosen.names):
         if chosen.family.get(name):
@@ -61,8 +52,8 @@ def families_of(
     found = []
     for family, mine in labels.items():
         share = min(sum(shares[label] for label in mine), 1.0)
-        others = [one for label, one in in_place.items() if label not in mine]
-        laws, held = _laws(contest, family, weights)
+        others = [one for label, one in names.in_place.items() if label not in mine]
+        laws, held = _laws(names.contest, family, names.weights)
         vague = size_errors.get(max(mine, key=lambda label: shares[label]), 0.0)
 
         def chance(rest: float, family: str = family, share: float = share, vague: float = vague) -> float:

@@ -7,7 +7,9 @@ an effect that improves the prediction whatever its size does so at a limit of i
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from rhythmid.diagnose.constants import (
     HOLDS,
     OPEN,
     PRIOR_ODDS,
+    STATED,
     STEEPNESS,
     VAGUE,
     VAGUENESS,
@@ -24,6 +27,87 @@ from rhythmid.diagnose.evidence import probabilities
 from rhythmid.diagnose.hypothesis import Hypothesis
 from rhythmid.diagnose.rejections import keeps_shape
 from rhythmid.diagnose.selection import Contest, Selection, beside_small_effects
+
+
+@dataclass(frozen=True)
+class Names:
+    """The names of the chosen hypothesis' effects, and how probable they are.
+
+    Parameters
+    ----------
+    contest, chosen : all hypotheses, and the chosen one.
+    labels : its effects that may be named, the largest share first.
+    weights : weight of each hypothesis, by its key.
+    in_place : for each label the chance that the effect stands in the place of an unknown law, and the share of the mismatch that it
+        removes.
+    law : for each label the chance that the effect is the law that its name says, where the hypothesis is true.
+    """
+
+    contest: Contest
+    chosen: Hypothesis
+    labels: tuple[str, ...]
+    weights: Mapping[tuple[str, ...], float]
+    in_place: Mapping[str, tuple[float, float]]
+    law: Mapping[str, float]
+
+    @classmethod
+    def of(
+        cls,
+        contest: Contest,
+        selection: Selection,
+        labels: tuple[str, ...],
+        shares: Mapping[str, float],
+        left: float,
+        size_errors: Mapping[str, float],
+    ) -> "Names":
+        """Probabilities, given the effects' shares of the mismatch, the share `left`, and the relative deviations of the sizes."""
+        chosen = selection.chosen
+        names = dict(zip(chosen.elements, chosen.names))
+        family = {label: chosen.family.get(names[label], "") for label in labels}
+
+        def chance(label: str, left: float) -> float:
+            return chance_of_law(shares[label], left, size_errors.get(label, 0.0), family[label])
+
+        in_place = {
+            label: (doubt(chance(label, left), family[label]), removed_by(label, chosen, contest))
+            for label in labels
+        }
+        law = {
+            label: chance_beside(
+                [in_place[one] for one in labels if names[one] != names[label]], partial(chance, label), left
+            )
+            for label in labels
+        }
+        return cls(contest, chosen, labels, weights_of(contest, selection), in_place, law)
+
+    def name(self, label: str) -> str:
+        """The element's name of an effect."""
+        return self.chosen.names[self.chosen.elements.index(label)]
+
+    def evidence_for(self, labels: Sequence[str]) -> float:
+        """Share of the evidence held by hypotheses that contain the names of all these effects."""
+        return joint_probability(
+            [self.name(label) for label in labels], self.contest, self.chosen, self.weights
+        )
+
+    def probability(self, labels: Sequence[str]) -> float:
+        """Joint probability of these effects.
+
+        Of effects with the same name, a smaller one exists only beside the larger ones.
+        """
+        least = {
+            self.name(label): self.labels.index(label) for label in sorted(labels, key=self.labels.index)
+        }
+        held = [one for n, one in enumerate(self.labels) if n <= least.get(self.name(one), -1)]
+        return min((self.law[label] for label in labels), default=1.0) * self.evidence_for(held)
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """As many effects, the largest shares first, as are jointly probable enough to be stated."""
+        count = 0
+        while count < len(self.labels) and self.probability(self.labels[: count + 1]) >= STATED:
+            count += 1
+        return self.labels[:count]
 
 
 def weights_of(contest: Contest, selection: Selection) -> dict[tuple[str, ...], float]:
@@ -54,7 +138,7 @@ def resolved(error: float) -> float:
 
 
 def joint_probability(
-    names: Sequence[str], contest: Contest, chosen: Hypothesis, weights: dict[tuple[str, ...], float]
+    names: Sequence[str], contest: Contest, chosen: Hypothesis, weights: Mapping[tuple[str, ...], float]
 ) -> float:
     """Share of the evidence held by hypotheses that contain all these names of the chosen one.
 

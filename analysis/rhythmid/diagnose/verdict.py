@@ -1,9 +1,8 @@
 """The verdict: consistent, missing physics, unknown physics or undecided."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 
 from scipy.stats import t as student
 
@@ -11,14 +10,7 @@ from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, LEFT, STATED
 from rhythmid.diagnose.evidence import chance_better, difference, gain_ahead, removed, weight_for
 from rhythmid.diagnose.family import MissingFamily, families_of
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, Verdict
-from rhythmid.diagnose.probability import (
-    chance_beside,
-    chance_of_law,
-    doubt,
-    joint_probability,
-    removed_by,
-    weights_of,
-)
+from rhythmid.diagnose.probability import Names
 from rhythmid.diagnose.rejections import FEW, decisive, keeps_shape
 from rhythmid.diagnose.selection import Contest, Selection, equivalent
 from rhythmid.diagnose.verdict_rules import Outcome, rule_for
@@ -77,7 +69,7 @@ class Decision:
     shares: dict[str, float]
     probability: dict[str, float]
     joint: float
-    weights: dict[tuple[str, ...], float]
+    weights: Mapping[tuple[str, ...], float]
     equivalent: tuple[tuple[str, ...], ...]
     unexplained: Unexplained
     beside: tuple[str, ...] = ()
@@ -218,45 +210,9 @@ def decide(
     chosen = selection.chosen
     left = unexplained(contest, chosen)
     shares = shares_of(contest, chosen)
-    weights = weights_of(contest, selection)
-    labels = tuple(sorted(chosen.elements, key=lambda label: -round(shares[label], 6)))
-    names = dict(zip(chosen.elements, chosen.names))
-    if chosen.kind == "free_map":  # a map is not a name
-        labels = tuple(label for label in labels if label != chosen.elements[-1])
-    if chosen.kind == "delay" and chosen.effects:  # a delay beside effects is reported with the delays
-        labels = tuple(label for label in labels if label != INPUT_DELAY)
     lost = left.expected + lost_share(contest, chosen)
-
-    def chance(label: str, left: float) -> float:
-        """Chance that an effect is the law that its name says, where so much of the mismatch is left."""
-        family = chosen.family.get(names[label], "")
-        return chance_of_law(shares[label], left, size_errors.get(label, 0.0), family)
-
-    in_place = {
-        label: (
-            doubt(chance(label, lost), chosen.family.get(names[label], "")),
-            removed_by(label, chosen, contest),
-        )
-        for label in labels
-    }
-    sure = {
-        label: chance_beside(
-            [in_place[one] for one in labels if names[one] != names[label]], partial(chance, label), lost
-        )
-        for label in labels
-    }
-
-    def stands_for(one: str, label: str) -> bool:
-        return names[one] == names[label] and labels.index(one) <= labels.index(label)
-
-    def probability(some: Sequence[str]) -> float:
-        # of effects with the same name, the smaller one exists only beside the larger ones
-        all_of_them = [one for one in labels if any(stands_for(one, label) for label in some)]
-        held = joint_probability([names[label] for label in all_of_them], contest, chosen, weights)
-        return min((sure[label] for label in some), default=1.0) * held
-
-    each = {label: probability([label]) for label in labels}
-    stated = _stated(labels, probability)
+    names = Names.of(contest, selection, _to_name(chosen, shares), shares, lost, size_errors)
+    labels, stated = names.labels, names.stated
     groups = _groups(contest, selection)
     missed = math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300)
     important = max(contest.unnamed * contest.size, 1e-300)
@@ -274,7 +230,7 @@ def decide(
         astray=(chosen.heldout_nrmse or 0.0) / contest.follows,
         detectable=detectable,
         vague=size_errors.get(labels[0], 0.0) if labels else 0.0,
-        evidence=joint_probability([names[label] for label in labels], contest, chosen, weights),
+        evidence=names.evidence_for(labels),
         alike=bool(groups),
         cut_short=contest.cut_short,
         withheld=withheld(contest, selection) / important,
@@ -282,35 +238,30 @@ def decide(
     )
     rule = rule_for(found)
     named = stated if rule.verdict == "missing_physics" else labels
-    told = {names[label] for label in named}
-    agreed = [
-        label
-        for label in labels
-        if label in chosen.effects and joint_probability([names[label]], contest, chosen, weights) >= STATED
-    ]
-    families = families_of(contest, chosen, shares, weights, lost, in_place, size_errors)
+    told = {names.name(label) for label in named}
+    effects = [label for label in labels if label in chosen.effects]
     return Decision(
         verdict=rule.verdict,
         reason=rule.reason_of(found),
         rule=rule.name,
         named=named,
         shares=shares,
-        probability=each,
-        joint=probability(stated or labels),
-        weights=weights,
+        probability={label: names.probability([label]) for label in labels},
+        joint=names.probability(stated or labels),
+        weights=names.weights,
         equivalent=tuple(group for group in groups if group[0] in told),
         unexplained=left,
-        beside=tuple(names[label] for label in labels if label not in named and label in chosen.effects),
-        families=families if rule.tells_family else (),
-        agreed=tuple(agreed),
+        beside=tuple(names.name(label) for label in effects if label not in named),
+        families=families_of(names, shares, lost, size_errors) if rule.tells_family else (),
+        agreed=tuple(label for label in effects if names.evidence_for([label]) >= STATED),
     )
 
 
-def _stated(labels: Sequence[str], probability: Callable[[Sequence[str]], float]) -> tuple[str, ...]:
-    """The largest number of effects, those with the largest shares first, that are jointly probable enough to be stated."""
-    found: tuple[str, ...] = ()
-    for count in range(1, len(labels) + 1):
-        if probability(labels[:count]) < STATED:
-            break
-        found = tuple(labels[:count])
-    return found
+def _to_name(chosen: Hypothesis, shares: Mapping[str, float]) -> tuple[str, ...]:
+    """Labels of the chosen effects that an answer may name, the largest share first."""
+    labels = tuple(sorted(chosen.elements, key=lambda label: -round(shares[label], 6)))
+    if chosen.kind == "free_map":  # a map is not a name
+        labels = tuple(label for label in labels if label != chosen.elements[-1])
+    if chosen.kind == "delay" and chosen.effects:  # a delay beside effects is reported with the delays
+        labels = tuple(label for label in labels if label != INPUT_DELAY)
+    return labels

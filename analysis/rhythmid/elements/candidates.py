@@ -9,12 +9,14 @@ from rhythmid.elements.element import OFTEN_ENOUGH, Element, Scales
 from rhythmid.elements.first_guess import NoGuess
 
 STIFFNESS = "stiffness"  # the family of the forces that bring a position back
+DRIFT = "drift"  # the family of the laws of the time
 IDLE = "no command, forcing or controller drives the machine"
 # along such a motion the way before sliding is a spring from wherever the record begins, and with a state of its own in each
 # window a constant force of each
 NEVER_REVERSED = "the motion never comes back, and without reversals nothing but the first way shows what it does before it slides"
 STEADY = "the drive changes only once in each record, which does not show that its effect changes with time"
 ONE_WAY = "nothing in the model restores the position, and the motion never comes back, so that a force of the position is not told from one of the speed or the time"
+DYING = "nothing drives the motion, and it meets each speed once, so that a law of the time or the past is not told from one of the speed"
 LEVEL = "the drive never changes within a record, which shows no delay, lag or memory on its way"
 
 
@@ -101,8 +103,11 @@ def _unsuitable(element: Element, setting: Setting, scales: Scales) -> str | Non
     turns = (
         element.rotational and scales.high - scales.low >= 2.0 * math.pi
     )  # what it does comes back with each turn
-    if element.family == STIFFNESS and not (setting.restored or scales.comes_back or turns):
+    one_way = not (setting.restored or scales.comes_back or turns)
+    if element.family == STIFFNESS and one_way:
         return ONE_WAY
+    if scales.idle and scales.once and one_way and (element.states or element.family == DRIFT):
+        return DYING
     if element.reversing and not scales.comes_back:
         return NEVER_REVERSED
     if (reason := _untold_by_levels(element, setting, scales)) is not None:

@@ -121,6 +121,7 @@ class Scales:
     changes: int = OFTEN_ENOUGH
     swings: tuple[float, float] = (0.0, 0.0)  # [Hz] lowest and highest frequency of a free oscillation
     comes_back: bool = True  # whether the position moves back and forth in some record
+    once: bool = False  # whether every record passes through each of its speeds only once, as a machine that coasts down
     # smallest, mean and largest value and standard deviation of what the sensor measures, where that is not the position of
     # the mass that the forces act on: its speed, or its position beside that relative to a moving base
     signal: tuple[float, float, float, float] | None = None

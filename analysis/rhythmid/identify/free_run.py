@@ -1,6 +1,7 @@
 """Free-run simulation of a model over many series, prepared once and run often."""
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -10,14 +11,14 @@ from scipy.interpolate import PPoly
 
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model
-from rhythmid.identify.inputs import Pieces
+from rhythmid.identify.inputs import LONG, Pieces
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model
 from rhythmid.simulation.generated_source import InputKind, OutputKind, Variant
 from rhythmid.simulation.signal import is_held, pieces
 from rhythmid.simulation.simulate import start_states
-from rhythmid.simulation.transport import command_delay, physical_times
+from rhythmid.simulation.transport import acting_delay, command_delay, physical_times
 
 Array = NDArray[np.float64]
 DIVERGED = 1e100  # in any unit; the square of a larger value would overflow
@@ -67,9 +68,11 @@ class FreeRun:
         `start` is the state at the first centre. Parameters that the record declares replace the model's own. Returns
         None when the simulation diverges. Raises ValueError when the length of `start` is not that of the state vector.
         """
+        return self._rows(self.prepared(model, index), start, disturbance)
+
+    def _rows(self, given: Prepared, start: Array, disturbance: PPoly | None = None) -> Array | None:
         if start.shape != (self.states,):  # the compiled loop would read past its end
             raise ValueError(f"a start of shape {start.shape} for {self.states} states")
-        given = self.prepared(model, index)
         out = np.empty((len(given.times), self.states + 2))
         force = NO_SIGNAL if disturbance is None else pieces(disturbance)
         done = given.compiled.run(
@@ -84,21 +87,24 @@ class FreeRun:
         given = one.inputs
         model = own_model(model, one)
         times = np.ascontiguousarray(physical_times(model, one.centres))
-        late = command_delay(model, given.stamps)
-        varies = late is not None and len(late) > 0 and np.ptp(late) > 0.0
+        late = acting_delay(model, given.stamps)
+        varies = isinstance(late, np.ndarray)
         smooth = one.smooth if self.smooth else None
         compiled = self.compiled if smooth is None or not varies else self.stopping()
         knots, coefficients = given.command if smooth is None or varies else smooth
-        if late is not None and len(late):
+        if late is not None and len(given.stamps):
             knots = knots.copy()
-            knots[1:-1] += late if varies else late[0]
+            knots[1:-1] += late
         return Prepared(compiled, times, (knots, coefficients), given.forcing, compiled.layout.vector(model))
 
     def outputs(self, model: Model, starts: Sequence[Array]) -> list[Array] | None:
         """Block-averaged outputs of all series from the given starts; None when one series diverges."""
+        return self._outputs((self.prepared(model, index) for index in range(len(self.series))), starts)
+
+    def _outputs(self, given: Iterable[Prepared], starts: Sequence[Array]) -> list[Array] | None:
         found: list[Array] = []
-        for index, one in enumerate(self.series):
-            rows = self.rows(model, index, starts[index])
+        for one, prepared, start in zip(self.series, given, starts, strict=True):
+            rows = self._rows(prepared, start)
             if rows is None:
                 return None
             found.append(one.of_block(rows[:, self.states]))
@@ -106,9 +112,20 @@ class FreeRun:
 
     def many(self, cases: Sequence[tuple[Model, Sequence[Array]]], pool: ThreadPoolExecutor | None) -> list:
         """Outputs of several cases (model, starts), computed by the compiled loop in parallel threads."""
-        if pool is None:
-            return [self.outputs(*case) for case in cases]
-        return list(pool.map(lambda case: self.outputs(*case), cases))
+        often = Counter(id(model) for model, _ in cases)
+        short = all(len(one.inputs.stamps) < LONG for one in self.series)
+        shared = {  # by the cases that differ in their starts alone
+            id(model): [self.prepared(model, index) for index in range(len(self.series))]
+            for model, _ in {id(case[0]): case for case in cases}.values()
+            if short and often[id(model)] > 1
+        }
+
+        def outputs(case: tuple[Model, Sequence[Array]]) -> list[Array] | None:
+            model, starts = case
+            given = shared.get(id(model))
+            return self.outputs(model, starts) if given is None else self._outputs(given, starts)
+
+        return [outputs(case) for case in cases] if pool is None else list(pool.map(outputs, cases))
 
 
 def _sees_steps(model: Model) -> bool:

@@ -69,6 +69,7 @@ class _Comparison:
         self.m = np.arange(-SIDEBANDS, SIDEBANDS + 1) if pumping.active else np.zeros(1, dtype=np.int64)
         self.spectra: Spectra = spectra(record, pumping, ring_down, SIDEBANDS + 1)
         self._guess: Array | None = None
+        self._last: tuple[Array, LinearisedModel] | None = None
         highest = (self.spectra.band[1] + SIDEBANDS * pumping.frequency) / self.spectra.resolution
         bins = np.arange(1, min(int(highest), len(self.spectra.output) - 1) + 1)
         if pumping.active:
@@ -97,10 +98,13 @@ class _Comparison:
         self.bins, self.variance = self.bins[keep], self.variance[keep]
 
     def linearised(self, values: Array) -> LinearisedModel:
+        if self._last is not None and np.array_equal(values, self._last[0]):  # only the delays differ
+            return self._last[1]
         model = self.model.with_values(dict(zip(self.names, values)))
         order = ORDER if self.pumping.active else 0  # without pumping there are no sidebands
         found = linearised(model, self.pumping, self._guess, order, self.kind)
         self._guess = found.cycle.states[0]
+        self._last = np.array(values), found
         return found
 
     def sidebands(self, model: LinearisedModel) -> Complex:

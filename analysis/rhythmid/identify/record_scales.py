@@ -17,6 +17,8 @@ from rhythmid.model import Model
 Array = NDArray[np.float64]
 REST_LENGTH = "linear_spring.rest_length"
 THERE_AND_BACK = 2.0  # least path length, in units of the travel, of a motion that comes back
+# parts of a record whose mean speeds show whether it only rises or only falls, and the share of their range by which noise may turn it
+PARTS, TURNED = 50, 0.05
 NO_SPRING = 1e-4  # share of the inertia's stiffness m ω² below which a spring sets no scale
 
 
@@ -75,6 +77,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         changes=_changes(series, model),
         swings=(0.0, 0.0) if driven else swing_frequencies(series),
         comes_back=_comes_back(series, places),
+        once=all(_once(v) for _, v in motions),
         signal=_signal(series),
     )
 
@@ -89,6 +92,13 @@ def _comes_back(series: Sequence[Series], places: Sequence[Array]) -> bool:
         >= THERE_AND_BACK * float(np.ptp(np.concatenate(some)))
         for some in by_record.values()
     )
+
+
+def _once(speed: Array) -> bool:
+    """Whether a speed only rises or only falls."""
+    steps = np.diff([float(part.mean()) for part in np.array_split(speed, min(PARTS, len(speed)))])
+    up, down = float(steps[steps > 0.0].sum()), -float(steps[steps < 0.0].sum())
+    return min(up, down) <= TURNED * max(up, down)
 
 
 def _signal(series: Sequence[Series]) -> tuple[float, float, float, float]:

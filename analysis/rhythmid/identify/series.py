@@ -145,13 +145,14 @@ class Series:
             return samples
         once = 1.0 / self.block**2
         c = (1.0 / 120.0 - once / 36.0 + 7.0 * once**2 / 360.0) / 16.0 - (1.0 - once) / 288.0
-        bend = _extended(self._bend(samples), 1)
-        return samples + self._spread * bend + c * _extended(np.diff(bend, 2), 1)
+        bend = _extended(self._bend(samples))
+        slope = bend[1:] - bend[:-1]
+        return samples + self._spread * bend + c * _extended(slope[1:] - slope[:-1])
 
     def _bend(self, samples: Array) -> Array:
         """δ² of values at the blocks' centres: their second derivative times the usual distance of blocks, squared."""
         before, after = self._weights
-        slope = np.diff(samples)
+        slope = samples[1:] - samples[:-1]
         return after * slope[1:] - before * slope[:-1]
 
     @cached_property
@@ -217,21 +218,16 @@ class Series:
         return motion_power(self.averaged, chosen)
 
 
-def _extended(samples: Array, count: int) -> Array:
-    """Samples extended by `count` at either end, with the cubic through the last four samples there."""
-    for _ in range(count):
-        first = (
-            4.0 * samples[0] - 6.0 * samples[1] + 4.0 * samples[2] - samples[3]
-            if len(samples) > 3
-            else samples[0]
-        )
-        last = (
-            4.0 * samples[-1] - 6.0 * samples[-2] + 4.0 * samples[-3] - samples[-4]
-            if len(samples) > 3
-            else samples[-1]
-        )
-        samples = np.concatenate([[first], samples, [last]])
-    return samples
+def _extended(samples: Array) -> Array:
+    """Samples (n,) extended by one at either end, with the cubic through the last four samples there."""
+    longer = np.empty(len(samples) + 2)
+    longer[1:-1] = samples
+    if len(samples) > 3:
+        longer[0] = 4.0 * samples[0] - 6.0 * samples[1] + 4.0 * samples[2] - samples[3]
+        longer[-1] = 4.0 * samples[-1] - 6.0 * samples[-2] + 4.0 * samples[-3] - samples[-4]
+    else:
+        longer[0], longer[-1] = samples[0], samples[-1]
+    return longer
 
 
 def _spline_of(time: Array, value: Array) -> PPoly:

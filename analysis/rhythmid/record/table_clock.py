@@ -164,6 +164,11 @@ def table_clock(
             return Clock(
                 "column", column=name, scale=scale
             ), f"the first column that goes forward by steps of one size; {why}"
+    if (alone := _rises_alone(columns)) is not None:
+        scale, why = _guessed_scale(dict(columns)[alone])
+        return Clock(
+            "column", column=alone, scale=scale
+        ), f"the only column that increases in every row; {why}"
     names = ", ".join(name for name, _ in columns[:MOST_NAMED])
     if len(columns) > MOST_NAMED:
         names += f" and {len(columns) - MOST_NAMED} more"
@@ -184,6 +189,14 @@ def table_clock(
     raise InputError(
         f"{path}: no column goes forward like a time ({names}){why}; give the rows' rate with --rate HZ"
     )
+
+
+def _rises_alone(columns: Sequence[tuple[str, Array]]) -> str | None:
+    """Name of the only column that increases in every row of a table without names; None where there is none, or more
+    than one. A loop without a fixed period, and a recorder of events, write times by uneven steps."""
+    rising = [name for name, value in columns if bool((np.diff(value) > 0.0).all())]
+    unnamed = len(columns) > 1 and all(name.isdigit() for name, _ in columns)
+    return rising[0] if unnamed and len(rising) == 1 and len(columns[0][1]) >= FEWEST_COMMON_SAMPLES else None
 
 
 def named_clock(name: str, value: Array) -> tuple[Clock, str]:

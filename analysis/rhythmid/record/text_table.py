@@ -156,7 +156,7 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
         head = lvm.names(head, len(cells))
     if head is None:
         head = _unnamed(lines[: used[place][0]], separator, split[place:])
-    if not head[-1] and not cells[-1]:
+    if not head[-1] and (not cells[-1] or len(head) > len(cells)):  # a separator after the last name
         head = head[:-1]
     if len(head) == len(cells) - 1 and not cells[-1]:  # every row ends with a separator
         numeric = numeric[:-1]

@@ -66,20 +66,28 @@ class CommandPath:
             stamps = stamps + late
             if _varies(late):
                 stamps = np.maximum.accumulate(stamps)
-            if len(stamps):
+            if len(stamps) and self._last[index] > -np.inf:
                 stamps = np.maximum(stamps, self._last[index])
+            if len(stamps):
                 self._last[index] = float(stamps[-1])
             yield late, stamps
 
 
 def command_delay(model: Model, stamps: Array) -> Array | None:
     """Delays (n,) [s] of commands stamped `stamps` [s]; None where the command path has no delay."""
+    late = acting_delay(model, stamps)
+    return late if late is None or isinstance(late, np.ndarray) else np.full(len(stamps), late)
+
+
+def acting_delay(model: Model, stamps: Array) -> Array | float | None:
+    """As `command_delay`, but one number [s] where all commands have the same delay."""
     stages = list(CommandPath(model).stages(stamps))
     if not stages:
         return None
     if any(_varies(late) for late, _ in stages):
-        return stages[-1][1] - stamps
-    return np.full(len(stamps), sum((float(late[0]) for late, _ in stages if len(late)), 0.0))
+        late = stages[-1][1] - stamps
+        return late if _varies(late) else float(late[0])
+    return float(sum(float(late[0]) for late, _ in stages if len(late)))
 
 
 def delayed_command(model: Model, command: PPoly | None) -> PPoly | None:
@@ -92,4 +100,4 @@ def delayed_command(model: Model, command: PPoly | None) -> PPoly | None:
 
 
 def _varies(late: Array) -> bool:
-    return len(late) > 0 and bool(np.ptp(late) > 0.0)
+    return len(late) > 0 and bool(late.max() > late.min())

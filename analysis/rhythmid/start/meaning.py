@@ -110,6 +110,8 @@ COMPUTED = frozenset(
 )
 IGNORED = COMPUTED | frozenset("temp temperature battery power status mode".split())
 
+ARRAY_OF_NAMES = re.compile(r"\b[A-Za-z]\[\d+\]\.")
+
 
 @dataclass(frozen=True)
 class Meaning:
@@ -126,8 +128,12 @@ class Meaning:
 
 
 def words_of(text: str) -> list[str]:
-    """Words of a name in lower case and without accents: split at capitals, digits, dots, slashes and underscores."""
+    """Words of a name in lower case and without accents: split at capitals, digits, dots, slashes and underscores.
+
+    The letter of an array whose elements have names, such as `Y` in `Y[2].voltage`, is no word.
+    """
     bare = "".join(one for one in unicodedata.normalize("NFKD", text) if not unicodedata.combining(one))
+    bare = ARRAY_OF_NAMES.sub(" ", bare)
     apart = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", bare)
     return re.findall(r"[a-z]+|\d+", apart.lower())
 

@@ -1,6 +1,6 @@
 """Assigns roles to recorded numbers: driving signal, output and further signals, each with its reason."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -61,9 +61,11 @@ def first_answer(question: str, answers: Sequence[str]) -> int:
     return 0
 
 
-def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_answer) -> Roles:
-    """Roles of the numbers in a source. Raises InputError where no number can be the output, or no joint is called
-    `joint`."""
+def guess_roles(
+    found: Inventory, joint: str | None = None, ask: Ask = first_answer, stepped: Collection[str] = ()
+) -> Roles:
+    """Roles of the numbers in a source, of which those named in `stepped` change from one source to the next. Raises
+    InputError where no number can be the output, or no joint is called `joint`."""
     known = [
         Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one) and not _is_clock(one)
     ]
@@ -113,9 +115,9 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     if carried is not None:
         reason = f"a motion that drives {carried.driven}, and nothing else drives"
         more = {"input": Choice(carried.driver, reason, doubts=(carried.doubt,))}
-    step = None if more else step_before(found.constant, chosen)
+    step = None if more else step_before(found.constant, chosen, stepped)
     if step is not None:
-        more = {"input": Choice(step, "the only effort, and nothing else drives", doubts=(BEFORE,))}
+        more = {"input": Choice(*step, doubts=(BEFORE,))}
     only = more.get("input") if len(more) == 1 and kind == "force" else None
     duty = duty_before(found.constant, chosen, output.recorded, measured) if only is not None else None
     if (
@@ -125,9 +127,12 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     ):
         reason = f"it feeds a motor from the first sample on, and the machine starts from rest; {only.recorded} was measured"
         more = {"input": Choice(duty, reason, (only.recorded, *only.others), (BEFORE,))}
-    if not more and (step := set_point_before(found.constant, chosen, output.recorded, measured)) is not None:
+    if (
+        not more
+        and (asked := set_point_before(found.constant, chosen, output.recorded, measured)) is not None
+    ):
         reason = f"a {measured} that was asked for, to which the output goes, and nothing else drives"
-        more = {"input": Choice(step, reason, doubts=(BEFORE,))}
+        more = {"input": Choice(asked, reason, doubts=(BEFORE,))}
         kind, reference_of = "reference", measured
     choices |= {role: _doubted(choice, copies) for role, choice in more.items()}
     if not more:

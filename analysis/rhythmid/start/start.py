@@ -21,6 +21,7 @@ from rhythmid.record.standstill import standstill
 from rhythmid.start.correction import corrected
 from rhythmid.start.force_unit import MODELLED
 from rhythmid.start.free_parts import free_parts
+from rhythmid.start.levels import stepped
 from rhythmid.start.listed_joints import with_listed_joints
 from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.named_joints import with_joints
@@ -122,11 +123,23 @@ class Start:
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 @as_guessed()
 def guess(
-    source: str | Path, joint: str | None = None, rate: float | None = None, ask: Ask = first_answer
+    source: str | Path,
+    joint: str | None = None,
+    rate: float | None = None,
+    ask: Ask = first_answer,
+    beside: Sequence[str | Path] = (),
 ) -> Guess:
-    """Inspect one recording and guess the roles of its channels; parameters and errors as for `start`."""
+    """Inspect one recording and guess the roles of its channels; parameters and errors as for `start`. What is constant in
+    it may change from one to the next of the recordings `beside` it."""
     found = with_joints(with_sides(with_listed_joints(_inventory(source, rate))))
-    tried = _tried(source, found, guess_roles(found, joint, ask))
+    roles = guess_roles(found, joint, ask)
+    if (
+        beside
+        and not any(role in roles.choices for role in MODELLED)
+        and (steps := stepped(found, beside, rate))
+    ):
+        roles = guess_roles(found, joint, ask, steps)
+    tried = _tried(source, found, roles)
     others = tried.roles.joint.others if joint is None else []
     first = tried.refused
     while (
@@ -203,7 +216,7 @@ def _guess_of_moving(
     first, none = None, None
     for number, source in enumerate(sources):
         try:
-            found = guess(source, joint, rate, ask)
+            found = guess(source, joint, rate, ask, [one for one in sources if one != source])
         except NoMotionError as error:  # what does not move in one recording may move in another
             none = none or error
             continue

@@ -1,6 +1,6 @@
 """A step of the effort or the reference before the record began: the channel is constant over the whole record."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -17,13 +17,21 @@ FIRST = 3  # samples that show whether a machine starts from rest
 SLOW = 0.2
 
 
-def step_before(constant: Sequence[Recorded], joint: Joint) -> Recorded | None:
-    """The one effort, by its name or unit, among the nonzero constants; None where there is none or several."""
-    efforts = [
-        one for one in constant
-        if (meaning := meaning_of(one)).quantity == "effort" and meaning.certain and joint.includes(one, meaning) and _is_known(one)
+def step_before(
+    constant: Sequence[Recorded], joint: Joint, stepped: Collection[str] = ()
+) -> tuple[Recorded, str] | None:
+    """The one effort, by its name or unit, among the nonzero constants, and why; without one, the only constant without a
+    meaning that is `stepped` from one recording to the next. None where there is none or several."""
+    known = [
+        (one, meaning) for one in constant if joint.includes(one, meaning := meaning_of(one)) and _is_known(one)
     ]  # fmt: skip
-    return efforts[0] if len(efforts) == 1 else None
+    efforts = [one for one, meaning in known if meaning.quantity == "effort" and meaning.certain]
+    untold = [one for one, meaning in known if not meaning.certain and str(one) in stepped]
+    if len(efforts) == 1:
+        return efforts[0], "the only effort, and nothing else drives"
+    if not efforts and len(untold) == 1:
+        return untold[0], "it has another level in other recordings, and nothing else drives"
+    return None
 
 
 def set_point_before(
