@@ -32,8 +32,8 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Machine:
     return Machine.load(folder / "two.yaml").with_inertial({"one.armature": ROTOR, "two.armature": ROTOR})
 
 
-def recorded(arm: Machine, stiffness: float) -> JointRecord:
-    """A run of the arm whose first gear has this stiffness [N m/rad]: the links' motion is given, the efforts and the encoder follow from it."""
+def recorded(arm: Machine, stiffness: float, lag: float = 0.0) -> JointRecord:
+    """A run of the arm whose first gear has this stiffness [N m/rad] and follows its torque with this lag [s]: the links' motion is given, the efforts and the encoder follow from it."""
     rng, time = np.random.default_rng(7), np.arange(0.0, 6.0, 0.004)
     link = np.column_stack(
         [0.5 + 0.4 * multisine(time, rng, 0.3, 2.0), 0.7 + 0.4 * multisine(time, rng, 0.3, 2.0)]
@@ -41,7 +41,8 @@ def recorded(arm: Machine, stiffness: float) -> JointRecord:
     curve = CubicSpline(time, link)
     rate, acceleration = curve(time, 1), curve(time, 2)
     torque = arm.body.inverse(link, rate, acceleration) - ROTOR * acceleration
-    encoder = link + np.column_stack([torque[:, 0] / stiffness, 0.0 * time])
+    angle = ElasticGear(1.0 / stiffness, arm.paths["one"], 0.0, lag).turned(torque[:, 0], 0.004)
+    encoder = link + np.column_stack([angle, 0.0 * time])
     motor = CubicSpline(time, encoder)
     effort = torque + ROTOR * motor(time, 2) + DAMPING * motor(time, 1)
     effort += 0.01 * np.std(effort, axis=0) * rng.normal(size=effort.shape)
@@ -56,10 +57,10 @@ def recorded(arm: Machine, stiffness: float) -> JointRecord:
     return JointRecord("run", made, sampled="instant")
 
 
-def diagnosed(arm: Machine, stiffness: float) -> MachineAnswer:
+def diagnosed(arm: Machine, stiffness: float, lag: float = 0.0) -> MachineAnswer:
     known = load_catalogue()
     few = Catalogue({name: known[name] for name in LAWS})
-    return diagnose_machine([recorded(arm, stiffness)], arm, catalogue=few)
+    return diagnose_machine([recorded(arm, stiffness, lag)], arm, catalogue=few)
 
 
 def test_a_gear_that_yields_is_named_once_at_its_joint_with_its_stiffness(arm: Machine):
@@ -80,6 +81,21 @@ def test_a_gear_that_yields_is_named_once_at_its_joint_with_its_stiffness(arm: M
     for one in found.joints.values():
         before, after = (one.fit[name].heldout_nrmse for name in ("refitted_nominal", "augmented"))
         assert before is not None and after is not None and after < 0.5 * before
+
+
+def test_the_stiffness_of_a_gear_with_damping_is_within_its_interval(arm: Machine):
+    (gear,) = diagnosed(arm, STIFFNESS, 0.02).diagnosis.missing
+    stiffness = gear.parameters["stiffness"]
+    assert gear.element == "gear_compliance" and stiffness.std is not None
+    assert stiffness.value == pytest.approx(STIFFNESS, abs=3.0 * stiffness.std)
+
+
+def test_a_gear_with_damping_follows_its_torque_later(arm: Machine):
+    time = np.arange(0.0, 10.0, 0.002)
+    gear = ElasticGear(0.01, arm.paths["one"], 0.0, 0.02)
+    turned = gear.turned(np.sin(2.0 * np.pi * time), 0.002)[1000:]
+    whole = 0.01 / (1.0 + 2j * np.pi * 0.02) * np.exp(2j * np.pi * time[1000:])
+    np.testing.assert_allclose(turned, whole.imag, atol=1e-6)
 
 
 def test_a_rigid_gear_is_not_named(arm: Machine):

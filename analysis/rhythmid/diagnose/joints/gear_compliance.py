@@ -1,4 +1,4 @@
-"""The compliance of a joint's gear, seen from the motor's side: one number of the machine that changes the efforts of all joints.
+"""The compliance of a joint's gear, seen from the motor's side, and its lag: two numbers of the machine that change the efforts of all joints.
 
 An encoder on the motor's side does not see the angle by which the gear yields. The link is elsewhere, and all joints feel that. The joint
 itself is judged with its measured torque, whose noise would look like a compliance there; so the other joints estimate it, and the joint
@@ -24,11 +24,14 @@ from rhythmid.report.quantity import with_std
 
 Array = NDArray[np.float64]
 STEP = 1e-4  # step of the finite difference, as a share of the prior standard deviation
+FASTER = 1e-2  # step of a gear's lag, as a share of the period of the motion over 2 pi
 
 
 @dataclass(frozen=True, eq=False)
 class GearCompliance:
-    """The gear of a joint that yields, as it fits the efforts of the other joints; units of a `rotational` joint or of one that slides."""
+    """The gear of a joint that yields, as it fits the efforts of the other joints; units of a `rotational` joint or of one that slides.
+
+    Its damping is not told: the lag of the gear also holds what the measured effort is misaligned."""
 
     joint: str
     gear: ElasticGear
@@ -60,7 +63,8 @@ class GearCompliance:
 
 @dataclass(frozen=True, eq=False)
 class _Yielding:
-    """The compliance of one joint's gear as a cause of the machine as a whole; its `spread` is the prior standard deviation."""
+    """One joint's gear as a cause of the machine as a whole: its compliance, whose prior standard deviation is the `spread`, and its compliance times
+    its lag, with which the efforts change linearly. A gear may lag by a radian at the strongest frequency of the motion."""
 
     balances: JointBalances
     joint: str
@@ -69,40 +73,56 @@ class _Yielding:
 
     @property
     def spreads(self) -> Array:
-        return np.array([self.spread])
+        return np.array([self.spread, self.spread / (2.0 * math.pi * self.balances.dominant)])
 
     @property
     def slopes(self) -> Array:
-        return np.eye(1)
+        return np.eye(2)
 
     def coordinates(self, numbers: Array) -> Array:
         return numbers
 
-    def gear(self, compliance: float, paths: Mapping[str, Model]) -> ElasticGear:
-        path = paths[self.joint]
-        return ElasticGear(compliance, path, path.mass.value - self.balances.models[self.joint].mass.value)
+    def gear(self, numbers: Array, paths: Mapping[str, Model]) -> ElasticGear:
+        path, compliance = paths[self.joint], float(numbers[0])
+        rotor = path.mass.value - self.balances.models[self.joint].mass.value
+        return ElasticGear(
+            compliance, path, rotor, float(numbers[1]) / compliance if compliance > 0.0 else 0.0
+        )
 
     def imposed(self, numbers: Array, paths: Mapping[str, Model]) -> JointBalances:
-        return self._with(float(numbers[0]), paths, False)
+        return self._with(numbers, paths, False)
 
     def columns(self, now: JointBalances, numbers: Array, paths: Mapping[str, Model]) -> Columns:
-        step = STEP * self.spread
-        moved = self._with(float(numbers[0]) + step, paths, False)
-        start = self._with(float(numbers[0]), paths, False)
+        """Differences from a gear that yields a little: one that does not has no lag."""
+        start = np.maximum(numbers, STEP * self.spreads * [1.0, 0.0])
+        before = self._with(start, paths, False)
+        made: list[Columns] = []
+        # a lag that is short beside the motion
+        steps = [STEP * self.spread, FASTER * start[0] / (2.0 * math.pi * self.balances.dominant)]
+        for step in np.diag(steps):
+            moved = self._with(start + step, paths, False)
+            made.append(
+                {
+                    joint: [
+                        (after.coupling - one.coupling)[:, None] / step.sum()
+                        for after, one in zip(moved.motions[joint], before.motions[joint], strict=True)
+                        if after.coupling is not None and one.coupling is not None
+                    ]
+                    for joint in self.balances.models
+                }
+            )
         return {
             joint: [
-                (after.coupling - before.coupling)[:, None] / step
-                for after, before in zip(moved.motions[joint], start.motions[joint], strict=True)
-                if after.coupling is not None and before.coupling is not None
+                np.concatenate(parts, axis=1) for parts in zip(*(one[joint] for one in made), strict=True)
             ]
             for joint in self.balances.models
         }
 
     def in_place(self, numbers: Array, paths: Mapping[str, Model]) -> JointBalances:
-        return self._with(float(numbers[0]), paths, True)
+        return self._with(numbers, paths, True)
 
-    def _with(self, compliance: float, paths: Mapping[str, Model], columns: bool) -> JointBalances:
-        gears = {**self.balances.gears, self.joint: self.gear(compliance, paths)}
+    def _with(self, numbers: Array, paths: Mapping[str, Model], columns: bool) -> JointBalances:
+        gears = {**self.balances.gears, self.joint: self.gear(numbers, paths)}
         return self.balances.with_gears(gears, columns)
 
 
@@ -128,7 +148,7 @@ def likely_gear(balances: JointBalances, found: Mapping[str, JointResult]) -> Ge
         return None
     return GearCompliance(
         cause.joint,
-        cause.gear(compliance, made.paths),
+        cause.gear(made.numbers, made.paths),
         std,
         balances.machine.body.joints[cause.joint].rotational,
         made.weight,

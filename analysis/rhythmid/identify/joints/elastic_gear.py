@@ -1,6 +1,7 @@
 """A gear that yields under the torque it transmits, between an encoder on the motor's side and the link.
 
-The link is where the encoder is, less the torque of the gear times its compliance (M. W. Spong, J. Dyn. Sys. Meas. Control 109 (1987) 310).
+The link is where the encoder is, less the torque of the gear times its compliance (M. W. Spong, J. Dyn. Sys. Meas. Control 109 (1987) 310). With
+damping, the angle of the gear follows that with a lag of damping over stiffness.
 The rotor and the losses of the joint's path are on the motor's side. The torque of the gear is the joint's effort less what these take. It
 is measured, so that no resonance has to be integrated. The angle of the gear passes the filter of the motion and is differentiated like it.
 """
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter, lfilter_zi
 
 from rhythmid.identify.inverse_dynamics.motion import low_pass
 from rhythmid.identify.joints.body_motion import BodyMotion
@@ -25,12 +27,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ElasticGear:
-    """The `compliance` of a joint's gear [rad/(N m), or m/N], and the `path` of the joint, with what its `rotor` differs from the body's
-    [kg m^2, or kg]."""
+    """The `compliance` of a joint's gear [rad/(N m), or m/N], the `path` of the joint, with what its `rotor` differs from the body's
+    [kg m^2, or kg], and the time [s] with which the gear follows its torque (`lag`)."""
 
     compliance: float
     path: Model
     rotor: float
+    lag: float = 0.0
+
+    def turned(self, torque: Array, period: float) -> Array:
+        """Angle (n,) of the gear under a torque (n,)."""
+        angle = self.compliance * torque
+        if self.lag <= 0.0:
+            return angle
+        whole = 2.0 * self.lag + period  # the trapezoidal rule
+        before, after = np.array([period, period]) / whole, np.array([1.0, (period - 2.0 * self.lag) / whole])
+        return np.asarray(lfilter(before, after, angle, zi=lfilter_zi(before, after) * angle[0])[0])
 
 
 def deflected(
@@ -40,7 +52,7 @@ def deflected(
     torque = {joint: transmitted(balances, joint, gear) for joint, gear in gears.items()}
     bodies = []
     for place, one in enumerate(rigid):
-        turned = {joint: gear.compliance * torque[joint][place] for joint, gear in gears.items()}
+        turned = {joint: gear.turned(torque[joint][place], one.period) for joint, gear in gears.items()}
         bodies.append(_behind(balances, one, turned) if turned else one)
     return bodies
 
