@@ -24,7 +24,7 @@ from rhythmid.report.quantity import with_std
 
 Array = NDArray[np.float64]
 STEP = 1e-4  # step of the finite difference, as a share of the prior standard deviation
-FASTER = 1e-2  # step of a gear's lag, as a share of the period of the motion over 2 pi
+FASTER = 1e-2  # step of a gear's lag, as a share of the longest one
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,12 @@ class _Yielding:
 
     @property
     def spreads(self) -> Array:
-        return np.array([self.spread, self.spread / (2.0 * math.pi * self.balances.dominant)])
+        return np.array([self.spread, self.spread * self.longest])
+
+    @property
+    def longest(self) -> float:
+        """The longest lag [s] of a gear."""
+        return 1.0 / (2.0 * math.pi * self.balances.dominant)
 
     @property
     def slopes(self) -> Array:
@@ -98,7 +103,7 @@ class _Yielding:
         before = self._with(start, paths, False)
         made: list[Columns] = []
         # a lag that is short beside the motion
-        steps = [STEP * self.spread, FASTER * start[0] / (2.0 * math.pi * self.balances.dominant)]
+        steps = [STEP * self.spread, FASTER * start[0] * self.longest]
         for step in np.diag(steps):
             moved = self._with(start + step, paths, False)
             made.append(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import lfilter, lfilter_zi
+from scipy.signal import lfilter
 
 from rhythmid.identify.inverse_dynamics.motion import low_pass
 from rhythmid.identify.joints.body_motion import BodyMotion
@@ -42,7 +42,7 @@ class ElasticGear:
             return angle
         whole = 2.0 * self.lag + period  # the trapezoidal rule
         before, after = np.array([period, period]) / whole, np.array([1.0, (period - 2.0 * self.lag) / whole])
-        return np.asarray(lfilter(before, after, angle, zi=lfilter_zi(before, after) * angle[0])[0])
+        return np.asarray(lfilter(before, after, angle, zi=(1.0 - before[:1]) * angle[0])[0])
 
 
 def deflected(
