@@ -37,7 +37,7 @@ BODIES = ("leg", "arm", "quadruped")
 NULLS = 0.15  # share of cases without any effect
 HELD = 0.5  # share of cases whose references are held
 SHARE = 0.1  # of the mismatch, above which an effect has to be named
-# [s] of the plants: steps of 1 ms, as the models have them, change the masses that an effort balance finds by 0.6 %, these by less than 0.1 %
+# [s]: steps of 1 ms, as the models have them, change the masses that an effort balance finds by 0.6 %, these by less than 0.1 %
 STEP = 1e-4
 LASTS = {"leg": 18.0, "arm": 20.0, "quadruped": 16.0}  # [s]
 # sizes as shares of the rms of the joint's effort (N m), or of what they multiply
@@ -164,7 +164,7 @@ def share_of(
 
 
 def simulated(body: str) -> Machine:
-    """The machine of a body at the steps of the plants."""
+    """The machine of a body at short steps; they are also the time for which its controllers hold their commands."""
     machine = Machine.load(MODELS / f"{body}.yaml")
     machine.body.model.opt.timestep = STEP
     return replace(machine, body=replace(machine.body, step=STEP))
@@ -174,7 +174,7 @@ def run(number: int, seed: int, bodies: Sequence[str], computed: bool = False) -
     """One case; with `computed` no effort is recorded."""
     rng = np.random.default_rng([seed, number])
     body = bodies[number % len(bodies)]
-    machine, real = Machine.load(MODELS / f"{body}.yaml"), simulated(body)
+    machine = simulated(body)
     time = np.arange(0.0, LASTS[body], 0.002)
     given = asked(body, machine, time, rng)
     joint = str(rng.choice(machine.joints))
@@ -185,17 +185,17 @@ def run(number: int, seed: int, bodies: Sequence[str], computed: bool = False) -
     if not carried_at(machine, joint):
         lacking.remove("payload")
     effect = "none" if rng.uniform() < NULLS else str(rng.choice(lacking))
-    plain = recorded(real, given, time, np.random.default_rng(0))
+    plain = recorded(machine, given, time, np.random.default_rng(0))
     channel = plain.joints[joint].effort
     assert channel is not None
-    plant, values = real, {}
+    plant, values = machine, {}
     if effect != "none":
         speed = float(np.abs(np.gradient(given[joint], time)).max())
-        plant, values = concealed(real, joint, effect, float(np.std(channel.value)), speed, rng)
+        plant, values = concealed(machine, joint, effect, float(np.std(channel.value)), speed, rng)
     held = bool(rng.uniform() < HELD) or effect == "command_hold"  # which holds what is held
     record = recorded(plant, given, time, rng, held=held, with_effort=not computed)
     without = recorded(
-        real, given, time, np.random.default_rng([seed, number, 1]), held=held, with_effort=not computed
+        machine, given, time, np.random.default_rng([seed, number, 1]), held=held, with_effort=not computed
     )
     share = 0.0 if effect == "none" else share_of(machine, plant, joint, effect, record, without)
     began = clock.process_time()
