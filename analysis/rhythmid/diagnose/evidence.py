@@ -53,7 +53,6 @@ class Linearised:
     precision : (p,) inverse variance of each parameter's prior; 0 where it has none.
     departure : (p,) each parameter's value less its prior's mean.
     rests : (r,) log odds of each rest of the machine, at most 0; see `odds_of_rests`. Not numbers where they are unknown.
-    validated : the latest cross-validation of the fit, and its blocks: hypotheses of a search are compared many times.
     """
 
     residual: Array
@@ -61,7 +60,6 @@ class Linearised:
     precision: Array
     departure: Array
     rests: Array = field(default_factory=lambda: np.zeros(0))
-    validated: list[tuple["Blocks", "CrossValidated"]] = field(init=False, default_factory=list, repr=False)
 
 
 @dataclass(frozen=True)
@@ -236,18 +234,11 @@ def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[P
 
     The autocorrelation time is that of the hypothesis that predicts best, because the errors of the others are not noise.
     """
-    found = [_validated(fit, blocks) for fit in fits]
+    found = [cross_validate(fit, blocks) for fit in fits]
     if not found:
         return []
     time = time_of_best(found, record)
     return with_trusted_rests([prediction(one, blocks, time) for one in found], blocks)
-
-
-def _validated(fit: Linearised, blocks: Blocks) -> CrossValidated:
-    """The cross-validation of a fit, made once for the same blocks."""
-    if not fit.validated or fit.validated[0][0] is not blocks:
-        fit.validated[:] = [(blocks, cross_validate(fit, blocks))]
-    return fit.validated[0][1]
 
 
 def with_trusted_rests(predictions: Sequence[Prediction], blocks: Blocks) -> list[Prediction]:
