@@ -95,10 +95,11 @@ class Names:
 
         Of effects with the same name, a smaller one exists only beside the larger ones.
         """
-        least = {
-            self.name(label): self.labels.index(label) for label in sorted(labels, key=self.labels.index)
-        }
-        held = [one for n, one in enumerate(self.labels) if n <= least.get(self.name(one), -1)]
+        last: dict[str, int] = {}  # place of the smallest of these effects, by name
+        for label in labels:
+            name = self.name(label)
+            last[name] = max(last.get(name, 0), self.labels.index(label))
+        held = [one for place, one in enumerate(self.labels) if place <= last.get(self.name(one), -1)]
         return min((self.law[label] for label in labels), default=1.0) * self.evidence_for(held)
 
     @property

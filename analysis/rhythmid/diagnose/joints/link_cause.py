@@ -288,8 +288,8 @@ def likely_link(
 
 
 def _simplest(tried: Sequence[_Tried], found: Mapping[str, JointResult]) -> _Tried:
-    """The change that is worth most, or the best one with fewer numbers that predicts as well, within the standard error of the difference between
-    blocks of the records: more numbers of a link also explain what filters and laws of friction leave."""
+    """The change that is worth most, or the best one with fewer numbers that predicts as well: more numbers of a link also explain what filters and
+    laws of friction leave."""
     best = max(tried, key=lambda one: one.worth)
     fewer = [one for one in tried if len(one.fit.numbers) < len(best.fit.numbers)]
     alike = [one for one in fewer if _as_good(one, best, found)]
@@ -297,7 +297,7 @@ def _simplest(tried: Sequence[_Tried], found: Mapping[str, JointResult]) -> _Tri
 
 
 def _as_good(one: _Tried, best: _Tried, found: Mapping[str, JointResult]) -> bool:
-    """Whether a change predicts as well as the `best` one, which has more numbers."""
+    """Whether the `best` change, which has more numbers, is ahead by no more than their price and `EQUIVALENT` standard errors over blocks."""
     made = [advantage(result, best.fit.best[joint], one.fit.best[joint]) for joint, result in found.items()]
     gain, error = sum(more for more, _ in made), math.hypot(*(error for _, error in made))
     more = len(best.fit.numbers) - len(one.fit.numbers)
