@@ -41,7 +41,6 @@ force:
   - coulomb_friction: {{force: {{value: {coulomb}, fixed: true}}, transition: {{value: 0.02, fixed: true}}}}
   - constant_force: {{force: {{value: {push}, fixed: true}}}}
 """
-NOT_REACHED = pytest.mark.xfail(reason="not reached with every version: see docs/real.md", strict=False)
 
 
 def present(name: str) -> pytest.MarkDecorator:
@@ -190,7 +189,7 @@ class Told:
 
 
 def diagnosed(case: Case, folder: Path) -> Told:
-    answer = folder / "answer.json"
+    answer = folder / f"{case.name.replace(' ', '_')}.json"
     command = [
         sys.executable,
         "-m",
@@ -242,14 +241,14 @@ def test_a_hand_that_pushes_the_pendulum_unrecorded_makes_no_wrong_name(cases, t
 
 @pytest.mark.long
 @present("xl330")
-@pytest.mark.parametrize("nominal", ["xl330", pytest.param("xl330 with Coulomb", marks=NOT_REACHED)])
+@pytest.mark.parametrize("nominal", ["xl330", "xl330 with Coulomb"])
 def test_the_servo_s_friction_grows_with_its_load(cases, tmp_path, nominal):
     told = diagnosed(cases[nominal], tmp_path)
     assert told.verdict == "missing_physics" and told.names[0] in LOAD_FRICTION
     assert told.after < 0.6 * told.before
 
 
-@NOT_REACHED
+@pytest.mark.xfail(strict=True, reason="the legs get different laws of friction, a calf a hysteresis")
 @pytest.mark.long
 @present("go2")
 @pytest.mark.parametrize("joint", ["thigh", "calf"])
