@@ -17,6 +17,7 @@ from rhythmid.diagnose.effort.lasting_error import lasting_share
 from rhythmid.diagnose.effort.reference import (
     HISTORY,
     Mapped,
+    beyond_noise,
     history_of,
     map_columns,
     reference_of,
@@ -46,6 +47,7 @@ from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import size_of, variation_of
 from rhythmid.identify.inverse_dynamics.free_map import FreeMap
+from rhythmid.identify.inverse_dynamics.motion_noise import noise_power
 from rhythmid.identify.robust_covariance import root_weights, weighted, with_robust_std
 
 Array = NDArray[np.float64]
@@ -173,6 +175,10 @@ def effort_run(
         return dict(zip(found, each, strict=True))
 
     weighed = made(ruled_out) | made(predicted)
+    maps = made(mapped)
+    if places == 1:  # a joint's motion is measured together with those of others
+        noise = noise_power(found.balance, case.records, found.chosen.fit.model)
+        maps = {of: beyond_noise(one, weighed[found.chosen.elements], noise) for of, one in maps.items()}
     errors = {
         tuple(sorted(elements)): float(np.sqrt(np.mean(one.error[rows.judged] ** 2)))
         for elements, one in (ruled_out | predicted).items()
@@ -183,7 +189,7 @@ def effort_run(
 
     contest = Contest(
         tuple(claimed(one) for one in found.hypotheses),
-        made(mapped),
+        maps,
         places * found.candidates,
         size,
         PRACTICAL_EFFORT,
