@@ -28,7 +28,7 @@ from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.progress import Tell, silent
-from rhythmid.simulation.generated_source import DRIVES
+from rhythmid.simulation.right_hand_side import DRIVES
 from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]

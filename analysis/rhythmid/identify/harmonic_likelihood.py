@@ -23,7 +23,7 @@ from rhythmid.ltp.pumping import Pumping
 from rhythmid.ltp.spectra import Spectra, spectra
 from rhythmid.model import Model
 from rhythmid.record.record import Record
-from rhythmid.simulation.generated_source import InputKind
+from rhythmid.simulation.right_hand_side import InputKind
 from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 
 Array = NDArray[np.float64]

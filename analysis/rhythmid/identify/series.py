@@ -22,7 +22,7 @@ from rhythmid.motion_power import motion_power
 from rhythmid.record.record import Record
 from rhythmid.record.rounding import resolution
 from rhythmid.record.timing import nominal_period
-from rhythmid.simulation.generated_source import InputKind, OutputKind
+from rhythmid.simulation.right_hand_side import InputKind, OutputKind
 from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, is_held, is_smooth, spline
 
 # share of blocks with a gap above which timestamps are too uneven for averaging; rare gaps cost fewer

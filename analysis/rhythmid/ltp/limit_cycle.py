@@ -16,7 +16,7 @@ from rhythmid.errors import InputError
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model, compile_rates
-from rhythmid.simulation.generated_source import InputKind, Variant
+from rhythmid.simulation.right_hand_side import InputKind, Variant
 from rhythmid.simulation.signal import pieces
 from rhythmid.simulation.simulate import MAX_STEP, start_states
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.model import INERTIA, Model
-from rhythmid.simulation.generated_source import DRIVES, InputKind
+from rhythmid.simulation.right_hand_side import DRIVES, InputKind
 
 DELAYS = ("input_delay.delay", "measurement_delay.delay")
 GAINED = (  # one effect of each kind that a slot of the signal path may gain

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import NO_HISTORY, compile_model
-from rhythmid.simulation.generated_source import Variant
+from rhythmid.simulation.right_hand_side import Variant
 from rhythmid.simulation.signal import FAR, continuous, pieces
 from rhythmid.simulation.transport import command_delay, physical_times
 from rhythmid.twin.changes import Change

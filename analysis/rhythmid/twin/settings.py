@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from rhythmid.errors import InputError
 from rhythmid.record.record import Record
-from rhythmid.simulation.generated_source import DRIVES, InputKind, OutputKind
+from rhythmid.simulation.right_hand_side import DRIVES, InputKind, OutputKind
 from rhythmid.simulation.signal import Hold
 
 SHORTEST_HEALTHY = (
