@@ -90,51 +90,38 @@ def identify(
     from rhythmid.record.read import load_records
 
     require_new(json, report, save_model, save)
+    terminal = Terminal(quiet, json)
     if model is not None and machines.is_machine(model):
         machines.refuse(
             save=save, forcing=forcing, clock_offset=clock_offset, clock_offset_std=clock_offset_std,
             method=method, htf=htf,
         )  # fmt: skip
         machines.identify_files(
-            bags,
-            model,
-            signals,
-            holdout or (),
-            elements or (),
-            json,
-            report,
-            save_model,
-            Terminal(quiet, json),
+            bags, model, signals, holdout or (), elements or (), json, report, save_model, terminal
         )
         return
     method, htf = method or "joint", htf or "auto"
-    if method not in get_args(Method):
-        raise InputError(f"--method {method}: one of {', '.join(get_args(Method))} is expected")
-    if htf not in get_args(HtfMethod):
-        raise InputError(f"--htf {htf}: one of {', '.join(get_args(HtfMethod))} is expected")
-    if forcing is not None and forcing not in get_args(Forcing):
-        raise InputError(f"--forcing {forcing}: one of {', '.join(get_args(Forcing))} is expected")
+    for option, given, kind in (
+        ("method", method, Method),
+        ("htf", htf, HtfMethod),
+        ("forcing", forcing, Forcing),
+    ):
+        if given is not None and given not in get_args(kind):
+            raise InputError(f"--{option} {given}: one of {', '.join(get_args(kind))} is expected")
     offset = offset_of(clock_offset, clock_offset_std)
     if offset is not None and forcing not in (None, "clock_unknown"):
         raise InputError(
             f"--clock-offset says that the forcing's clock is unknown, --forcing {forcing} that it is known"
         )
     known = None if model is None else Model.load(model, load_catalogue(elements or ()))
-    terminal = Terminal(quiet, json)
     with progress(terminal.progress) as tell:
         records = load_records(bags, signals, tell)
         unseen = load_records(holdout or (), signals, tell)
         path = "clock_unknown" if offset is not None else cast(Forcing | None, forcing)
         found = find(
-            records,
-            known,
-            method=cast(Method, method),
-            forcing=path,
-            offset=offset,
-            htf=cast(HtfMethod, htf),
-            tell=tell,
-            holdout=unseen,
-        )
+            records, known, method=cast(Method, method), forcing=path, offset=offset, htf=cast(HtfMethod, htf),
+            tell=tell, holdout=unseen,
+        )  # fmt: skip
     found.show(terminal.answer)
     if json is not None:
         write_json(json, found.to_dict())
@@ -148,7 +135,6 @@ def identify(
         from rhythmid.identify.present import present
         from rhythmid.report.page import write_page
 
-        write_page(
-            report, present(found, command_line(), "the paper's hopper" if model is None else model.name)
-        )
+        name = "the paper's hopper" if model is None else model.name
+        write_page(report, present(found, command_line(), name))
         terminal.say(f"report: {report}")
