@@ -158,9 +158,8 @@ def fork_each(
         return
     context = multiprocessing.get_context("fork")
     waiting, tried = deque(range(len(items))), set[int]()
-    running: dict[
-        Any, tuple[Any, int, int]
-    ] = {}  # its process, the item at hand, items that it may still take
+    # by pipe: its process, the item at hand, items that it may still take
+    running: dict[Any, tuple[Any, int, int]] = {}
 
     def start() -> None:
         ours, theirs = context.Pipe()

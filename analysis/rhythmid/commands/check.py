@@ -77,15 +77,15 @@ def check(
     elsewhere = separate_zeros_notes(records)
     for line in elsewhere:
         terminal.say(f"note: {line}")
-    try:
-        if model is not None:
-            from rhythmid.commands.model_line import model_lines
+    if model is not None:
+        from rhythmid.commands.model_line import model_lines
 
+        try:
             of_joints = joint_records([found.path for found in made if found.usable], signals)
             for line in model_lines(model, records, elements or (), of_joints):
                 terminal.say(line)
-    except InputError as error:
-        refused.append(str(error))
+        except InputError as error:
+            refused.append(str(error))
     if json is not None and made:
         told = [found.to_dict() for found in made]
         write_json(json, told if len(bags) > 1 else told[0])

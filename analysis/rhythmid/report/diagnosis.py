@@ -98,36 +98,30 @@ def _words(found: Findings) -> str:
     return f"{said}."
 
 
+def _heldout(found: Findings) -> str:
+    """The error on held-out data before and after, with its uncertainty."""
+    fit = found.result["fit"]
+    unseen = [run for run in found.runs if run.heldout]
+    shown = unseen or [run for run in found.runs if run.hidden.any()]
+    before, after = (error_of(shown, which, not unseen) for which in ("before", "after"))
+    value = percent(fit["refitted_nominal"]["heldout_nrmse"], before.half if before else None)
+    if not found.repaired:
+        return value
+    return f"{value} → {percent(fit['augmented']['heldout_nrmse'], after.half if after else None)}"
+
+
 def _tiles(found: Findings) -> Tiles:
     result = found.result
-    fit, detection = result["fit"], result["detection"]
+    detection = result["detection"]
     tiles: list[Tile] = []
     for effect in result["missing"]:
         first = next(iter(effect["parameters"].items()), None)
         if first is not None:
-            tiles.append(
-                Tile(
-                    f"{found.title(effect['element'])}: {pretty_name(first[0])}",
-                    told(first[1]),
-                    "95 % interval",
-                )
-            )
-    held = fit["refitted_nominal"]["heldout_nrmse"], fit["augmented"]["heldout_nrmse"]
-    unseen = [run for run in found.runs if run.heldout]
-    hidden = not unseen
-    shown = unseen or [run for run in found.runs if run.hidden.any()]
-    if held[0] is not None:
-        before, after = error_of(shown, "before", hidden), error_of(shown, "after", hidden)
-        value = percent(held[0], before.half if before else None)
-        if found.repaired:
-            value += f" → {percent(held[1], after.half if after else None)}"
-        tiles.append(
-            Tile(
-                f"error on held-out data, of the {found.compared.quantity}",
-                value,
-                "before → after" if found.repaired else "",
-            )
-        )
+            name = f"{found.title(effect['element'])}: {pretty_name(first[0])}"
+            tiles.append(Tile(name, told(first[1]), "95 % interval"))
+    if result["fit"]["refitted_nominal"]["heldout_nrmse"] is not None:
+        note = "before → after" if found.repaired else ""
+        tiles.append(Tile(f"error on held-out data, of the {found.compared.quantity}", _heldout(found), note))
     if found.noise is not None:
         tiles.append(
             Tile(
