@@ -6,7 +6,7 @@ elements that need a full simulation. Compiled once per element, for all models.
 
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -48,132 +48,85 @@ class Path:
         return np.gradient(self.velocity, self.time) if self.acceleration is None else self.acceleration
 
 
-@dataclass(frozen=True)
-class _Lines:
-    """Lines that evaluate one element along a trajectory; `s` are its states, of which the first ones are `flowing`."""
+def _rows(element: Element) -> list[str]:
+    """Names of the path's rows."""
+    return ["x", "v", "f", "leg", "z", *FURTHER.get(element.acts, ())]
 
-    element: Element
 
-    @property
-    def p(self) -> list[str]:
-        return [f"p{i}" for i in range(len(self.element.parameters) + len(self.element.borrows))]
+def _call(element: Element, at: str, number: int, states: list[str], elapsed: str) -> list[str]:
+    """Lines that evaluate the element at this share of the way to the next sample."""
+    signal = {"force": "", "command": "f", "actuator": "f"}.get(element.slot, "y")
+    arguments = ["z" if name == signal else name for name in LEADING[element.slot, element.acts]]
+    borrowed = (source for source, _ in element.borrows.values())
+    sources = [*(parameter.name for parameter in element.parameters), *borrowed]
+    given = [elapsed if source == ELAPSED else f"p{i}" for i, source in enumerate(sources)]
+    targets = ["value", *(f"a{number}_{i}" for i in range(len(element.own)))]
+    return [
+        "; ".join(f"{name} = {name}0 + {at} * ({name}1 - {name}0)" for name in _rows(element)),
+        f"t = begin + {at} * width",
+        f"{', '.join(targets)} = kernel({', '.join([*arguments, *given, *states])})",
+    ]
 
-    @property
-    def s(self) -> list[str]:
-        return [f"s{i}" for i in range(len(self.element.own))]
 
-    @property
-    def flowing(self) -> int:
-        return len(self.element.states)
+def _steps(element: Element) -> list[str]:
+    """Lines that take the states to the next sample: Runge-Kutta steps for those that flow, then the memories."""
+    s = [f"s{i}" for i in range(len(element.own))]
+    flowing = len(element.states)  # the first ones of `s`
+    if not s:
+        return []
 
-    @property
-    def rows(self) -> list[str]:
-        """Names of the path's rows."""
-        return ["x", "v", "f", "leg", "z", *FURTHER.get(self.element.acts, ())]
+    def moved(weight: str, number: int) -> list[str]:
+        return [f"{name} + {weight} * a{number}_{i}" if i < flowing else name for i, name in enumerate(s)]
 
-    @property
-    def change(self) -> str:
-        """What the element changes, given its `value`."""
-        if self.element.slot == "force":
-            return "value - leg" if self.element.acts == "modifier" else "value"
-        return "value - z"
-
-    def call(self, at: str, number: int, states: list[str], elapsed: str) -> list[str]:
-        """Evaluate the element at this share of the way to the next sample."""
-        element = self.element
-        signal = {"force": "", "command": "f", "actuator": "f"}.get(element.slot, "y")
-        arguments = ["z" if name == signal else name for name in LEADING[element.slot, element.acts]]
-        sources = [
-            *(parameter.name for parameter in element.parameters),
-            *(source for source, _ in element.borrows.values()),
-        ]
-        given = [elapsed if source == ELAPSED else name for name, source in zip(self.p, sources)]
-        targets = ", ".join(["value", *(f"a{number}_{i}" for i in range(len(self.s)))])
-        return [
-            "; ".join(f"{name} = {name}0 + {at} * ({name}1 - {name}0)" for name in self.rows),
-            f"t = begin + {at} * width",
-            f"{targets} = kernel({', '.join([*arguments, *given, *states])})",
-        ]
-
-    def _moved(self, weight: str, number: int) -> list[str]:
-        return [
-            f"{name} + {weight} * a{number}_{i}" if i < self.flowing else name
-            for i, name in enumerate(self.s)
-        ]
-
-    @property
-    def substep(self) -> list[str]:
-        """One step of the states: Runge-Kutta for the flowing ones, then the memories."""
-        call, s = self.call, self.s
-        lines = [
-            "at = substep / substeps", *call("at", 1, s, "0.0"),
-            "at = (substep + 0.5) / substeps",
-            *call("at", 2, self._moved("0.5 * h", 1), "0.5 * h"), *call("at", 3, self._moved("0.5 * h", 2), "0.5 * h"),
-            "at = (substep + 1.0) / substeps", *call("at", 4, self._moved("h", 3), "h"),
-            *(f"{n} = {n} + h / 6.0 * (a1_{i} + 2.0 * (a2_{i} + a3_{i}) + a4_{i})" for i, n in enumerate(s[: self.flowing])),
-        ] if self.flowing else ["at = 1.0"]  # fmt: skip
-        if self.element.memories:
-            lines += [*call("at", 1, s, "h"), *(f"s{i} = a1_{i}" for i in range(self.flowing, len(s)))]
-        return lines
-
-    @property
-    def steps(self) -> list[str]:
-        """All steps of the states to the next sample."""
-        if not self.s:
-            return []
-        number = "max(1, int(math.ceil(width / max_step * (1.0 - 1e-9))))" if self.flowing else "1"
-        return [
-            f"substeps = {number}",
-            "h = width / substeps",
-            "for substep in range(substeps):",
-            *(f"    {line}" for line in self.substep),
-        ]
-
-    @property
-    def first(self) -> list[str]:
-        """The change at the first sample."""
-        return [
-            "begin = time[0]; width = 0.0",
-            *(f"{name}0 = path[{i}, 0]; {name}1 = path[{i}, 0]" for i, name in enumerate(self.rows)),
-            *self.call("0.0", 1, self.s, "0.0"),
-            f"out[0] = {self.change}",
-        ]
-
-    @property
-    def next(self) -> list[str]:
-        """The change at the sample k."""
-        return [
-            "begin = time[k - 1]; width = time[k] - time[k - 1]",
-            *(f"{name}0 = path[{i}, k - 1]; {name}1 = path[{i}, k]" for i, name in enumerate(self.rows)),
-            *self.steps,
-            *self.call("1.0", 1, self.s, "0.0"),
-            f"out[k] = {self.change}",
-        ]
+    call = partial(_call, element)
+    inner = [
+        "at = substep / substeps", *call("at", 1, s, "0.0"),
+        "at = (substep + 0.5) / substeps",
+        *call("at", 2, moved("0.5 * h", 1), "0.5 * h"), *call("at", 3, moved("0.5 * h", 2), "0.5 * h"),
+        "at = (substep + 1.0) / substeps", *call("at", 4, moved("h", 3), "h"),
+        *(f"{n} = {n} + h / 6.0 * (a1_{i} + 2.0 * (a2_{i} + a3_{i}) + a4_{i})" for i, n in enumerate(s[:flowing])),
+    ] if flowing else ["at = 1.0"]  # fmt: skip
+    if element.memories:
+        inner += [*call("at", 1, s, "h"), *(f"s{i} = a1_{i}" for i in range(flowing, len(s)))]
+    number = "max(1, int(math.ceil(width / max_step * (1.0 - 1e-9))))" if flowing else "1"
+    return [
+        f"substeps = {number}",
+        "h = width / substeps",
+        "for substep in range(substeps):",
+        *(f"    {line}" for line in inner),
+    ]
 
 
 def _module(element: Element) -> Module:
-    kernel, lines = kernel_module(element), _Lines(element)
-    text = "\n".join(
-        [
-            '"""Generated by rhythmid: one element along a given trajectory."""',
-            "import math",
-            "",
-            "from numba import njit",
-            f"from {kernel.name} import {element.name} as kernel",
-            "",
-            '@njit("void(float64[::1], float64[:, ::1], float64[::1], float64[::1], float64, float64[::1])",',
-            '      cache=True, nogil=True, error_model="numpy")',
-            "def run(time, path, parameters, states, max_step, out):",
-            *(f"    {name} = parameters[{i}]" for i, name in enumerate(lines.p)),
-            *(["    yielding = 0.0"] if element.acts == "constraint" else []),
-            *(f"    {name} = states[{i}]" for i, name in enumerate(lines.s)),
-            *(f"    {line}" for line in lines.first),
-            "    for k in range(1, time.shape[0]):",
-            *(f"        {line}" for line in lines.next),
-            "",
-        ]
-    )
-    return Module(text, (kernel,))
+    kernel, rows = kernel_module(element), _rows(element)
+    s = [f"s{i}" for i in range(len(element.own))]
+    plain = "value - leg" if element.acts == "modifier" else "value"
+    change = plain if element.slot == "force" else "value - z"
+    lines = [
+        '"""Generated by rhythmid: one element along a given trajectory."""',
+        "import math",
+        "",
+        "from numba import njit",
+        f"from {kernel.name} import {element.name} as kernel",
+        "",
+        '@njit("void(float64[::1], float64[:, ::1], float64[::1], float64[::1], float64, float64[::1])",',
+        '      cache=True, nogil=True, error_model="numpy")',
+        "def run(time, path, parameters, states, max_step, out):",
+        *(f"    p{i} = parameters[{i}]" for i in range(len(element.parameters) + len(element.borrows))),
+        *(["    yielding = 0.0"] if element.acts == "constraint" else []),
+        *(f"    {name} = states[{i}]" for i, name in enumerate(s)),
+        "    begin = time[0]; width = 0.0",
+        *(f"    {name}0 = path[{i}, 0]; {name}1 = path[{i}, 0]" for i, name in enumerate(rows)),
+        *(f"    {line}" for line in _call(element, "0.0", 1, s, "0.0")),
+        f"    out[0] = {change}",
+        "    for k in range(1, time.shape[0]):",
+        "        begin = time[k - 1]; width = time[k] - time[k - 1]",
+        *(f"        {name}0 = path[{i}, k - 1]; {name}1 = path[{i}, k]" for i, name in enumerate(rows)),
+        *(f"        {line}" for line in [*_steps(element), *_call(element, "1.0", 1, s, "0.0")]),
+        f"        out[k] = {change}",
+        "",
+    ]
+    return Module("\n".join(lines), (kernel,))
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,19 +63,6 @@ class _Lines:
         """Lines for past signals."""
         return HistoryLines(tuple(self.side.delayed), self.variant.smooth)
 
-    @property
-    def imports(self) -> tuple[Module, ...]:
-        """Modules that the text imports."""
-        past = (history_module(),) if self.history.signals else ()
-        return pieces_module(), *past, *self.kernels.values()
-
-    @property
-    def layout(self) -> Layout:
-        """Positions in the arrays."""
-        side, history = self.side, self.history
-        width = history.width if history.signals else 0
-        return Layout(tuple(side.parameters.items()), tuple(side.states), tuple(side.memories), width)
-
     def _of_base(self, line: str) -> list[str]:
         return [line] if self.variant.excited == "base_displacement" else []
 
@@ -170,24 +157,15 @@ class _Lines:
         ]
 
     @property
-    def begin(self) -> list[str]:
-        """The past before the first sample, and its row."""
-        past = self.history.before_the_start(
+    def before(self) -> list[str]:
+        """The past before the first sample."""
+        return self.history.before_the_start(
             self.n,
             self.side.memories,
             self.find,
             {at: [*self.following(at), *self.inputs(at)] for at in ("t", "t + half", "t + h")},
             self.stage(1, "at", "", "0.0", "z"),
         )
-        return [*past, *self.record]
-
-    @property
-    def values(self) -> list[str]:
-        """Read the parameters from their array."""
-        return [
-            f"p{i} = {'max_step' if name == STEP else f'parameters[{i}]'}"
-            for i, name in enumerate(self.side.parameters)
-        ]
 
     @property
     def right_hand_side(self) -> str:
@@ -223,20 +201,24 @@ def rhs({", ".join(["t", *self._signals, *states, *parameters, *self.history.giv
         result = "Tuple((int64, float64[:, ::1]))" if kept else "int64"
         rest = f", past[{history.oldest} : last + 1].copy()" if kept else ""
         until = "until = end" if smooth else "until = min(end, ku[i + 1])"
+        values = [
+            f"p{i} = {'max_step' if name == STEP else f'parameters[{i}]'}"
+            for i, name in enumerate(self.side.parameters)
+        ]
         return f'''@njit(
     "{result}(float64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1],"
     " float64[::1], float64[::1], float64, float64[:, ::1]{", float64[:, ::1]" if kept else ""})",
     cache=True, nogil=True, error_model="numpy",
 )
 def run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out{", past" if kept else ""}):
-{_indent(self.values, 1)}
+{_indent(values, 1)}
 {_indent([f"s{i} = start[{i}]" for i in range(self.n)], 1)}
     i = 0
     j = 0
     l = 0
     t = times[0]
     k = 0
-{_indent(self.begin, 1)}
+{_indent([*self.before, *self.record], 1)}
     for k in range(1, times.shape[0]):
         end = times[k]
         while t < end:
@@ -273,13 +255,20 @@ def _lines(terms: tuple[Term, ...], variant: Variant) -> _Lines:
 def generate(terms: tuple[Term, ...], variant: Variant) -> tuple[Module, Layout]:
     """The module for this list of terms, and the layout of its arrays."""
     lines = _lines(terms, variant)
-    return Module(lines.right_hand_side + lines.loop, lines.imports), lines.layout
+    side, history = lines.side, lines.history
+    kept = bool(history.signals)
+    imports = (pieces_module(), *((history_module(),) if kept else ()), *lines.kernels.values())
+    layout = Layout(
+        tuple(side.parameters.items()), tuple(side.states), tuple(side.memories), history.width if kept else 0
+    )
+    return Module(lines.right_hand_side + lines.loop, imports), layout
 
 
 def generate_rates(terms: tuple[Term, ...], excited: InputKind = "force") -> tuple[Module, Layout]:
     """A module whose `run` evaluates the right-hand side at given points, with dead times as states, and its arrays' layout."""
-    lines = _lines(terms, Variant(excited, rational=True))
-    layout, n, p = lines.layout, lines.n, len(lines.side.parameters)
+    variant = Variant(excited, rational=True)
+    (whole, layout), lines = generate(terms, variant), _lines(terms, variant)
+    n, p = lines.n, len(layout.parameters)
     targets = ", ".join(f"out[k, {i}]" for i in range(n + 2))
     known = "t, u, w, 0.0" if excited == "base_displacement" else "t, u, w"
     arguments = ", ".join(
@@ -302,4 +291,4 @@ def run(times, command, forcing, states, parameters, out):
 {_indent([f"{targets} = rhs({arguments})", *follow], 2)}
     return times.shape[0]
 """
-    return Module(text, lines.imports), layout
+    return Module(text, whole.imports), layout
