@@ -90,12 +90,11 @@ def check(
         told = [found.to_dict() for found in made]
         write_json(json, told if len(bags) > 1 else told[0])
     if report is not None and made:
-        from rhythmid.report.page import write_page
         from rhythmid.report.recording import recording_page
 
         (found,) = made
-        write_page(report, recording_page(found.to_dict(), found.record, found.remarks, command_line()))
-        terminal.say(f"report: {report}")
+        page = recording_page(found.to_dict(), found.record, found.remarks, command_line())
+        terminal.report(report, page)
     if refused:
         raise InputError("; ".join(refused))
     matters = [*(line for found in made for line in found.matters), *elsewhere]

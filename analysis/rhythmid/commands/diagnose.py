@@ -115,7 +115,6 @@ def diagnose(
         answer.model.save(save_model)
     if report is not None:
         from rhythmid.diagnose.answer.present import present, present_comparison
-        from rhythmid.report.page import write_page
 
         with progress(terminal.progress) as tell:
             tell("drawing the report")
@@ -124,8 +123,7 @@ def diagnose(
             else:
                 assert comparison is not None and simulation is not None
                 page = present_comparison(comparison, simulation, records, command_line())
-            write_page(report, page)
-        terminal.say(f"report: {report}")
+        terminal.report(report, page)
 
 
 def _check(model: Path | None, sim: Path | None, budget: float | None, of_a_model: bool) -> None:

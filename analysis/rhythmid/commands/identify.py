@@ -133,8 +133,6 @@ def identify(
         terminal.say(f"{save}: not written, for no controller should use this fit")
     if report is not None:
         from rhythmid.identify.present import present
-        from rhythmid.report.page import write_page
 
         name = "the paper's hopper" if model is None else model.name
-        write_page(report, present(found, command_line(), name))
-        terminal.say(f"report: {report}")
+        terminal.report(report, present(found, command_line(), name))

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, cast
 
 from threadpoolctl import threadpool_limits
 
-from rhythmid import parallel
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.admission import Admitted, admitted
 from rhythmid.diagnose.agreement import HOW, contradictions, tells_all
@@ -41,6 +40,7 @@ from rhythmid.identify.plausibility import BACK, check_plausible, shift
 from rhythmid.identify.record_zero import without_record_zero
 from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
+from rhythmid.parallel import cores
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 from rhythmid.record.same_recording import check_held_out
@@ -219,7 +219,7 @@ def diagnose(
     check_free(model)
     given = admitted(records, holdout, model)
     # the matrices are tall and thin and workers run in parallel: threads inside linear algebra would only slow them down
-    with threadpool_limits(1), ThreadPoolExecutor(parallel.cores()) as pool:
+    with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         known = catalogue or load_catalogue()
         case = Case(model, given.records, given.holdout, known, pool, tell, Budget(budget))
         whole = replace(case, records=given.whole_records, holdout=given.whole_holdout)

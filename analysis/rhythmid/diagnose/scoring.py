@@ -27,7 +27,6 @@ from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 
-SHORTER = 2.0  # ratio of successive window lengths
 INTEGRATES = (
     "the model integrates or is unstable, so that a long free run would add up every small disturbance"
 )
@@ -184,7 +183,7 @@ def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
     length = max(float(np.median([periods_long(one) for one in series])), shortest)
     while length >= shortest:
         yield _Way("windows", _words(length, LOSES if free else INTEGRATES), partial(cut_up, length=length))
-        length /= SHORTER
+        length /= 2.0
 
 
 def _words(length: float, reason: str) -> str:

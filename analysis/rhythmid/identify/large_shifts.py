@@ -16,7 +16,6 @@ from rhythmid.report.quantity import number, rounded, with_written_unit
 TIMES = 4.0  # ratio of an estimate to the nominal value above which the shift is reported
 # sample periods by which a delay may exceed the nominal one: a longer one is seldom transport delay alone
 SAMPLES = 10.0
-MILLION = 1e6  # ratio above which only the shift is reported: one of the two values is not physical
 PASSED_BY = 2.0  # standard deviations by which an estimate has to exceed a limit
 # standard deviations, and a share of a sample, by which a delay has to be negative to be reported: with two
 # standard deviations, a machine without delay would be reported once in 40 times
@@ -75,9 +74,9 @@ def _values(nominal: Model, parameters: Mapping[str, Estimate]) -> Iterator[Caut
 
 def _times(ratio: float) -> str:
     """The ratio to the nominal value in words; without a number where it is a million or more."""
-    if abs(ratio) >= MILLION:
+    if abs(ratio) >= 1e6:
         return "more than a million times"
-    if 0.0 < ratio <= 1.0 / MILLION:
+    if 0.0 < ratio <= 1e-6:
         return "less than a millionth of"
     return f"{number(ratio, 2)} times" if not 0.0 < ratio < 1.0 else f"a {number(1.0 / ratio, 2)}th of"
 
