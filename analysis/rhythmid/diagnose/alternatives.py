@@ -32,11 +32,8 @@ from rhythmid.simulation.right_hand_side import DRIVES
 from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
-SIGNALS: tuple[Slot, ...] = (
-    "command",
-    "actuator",
-    "sensor",
-)  # slots for a law whose only parameters are times
+# slots for a law whose only parameters are times
+SIGNALS: tuple[Slot, ...] = ("command", "actuator", "sensor")
 CLOCKS: tuple[Slot, ...] = ("command", "timing")  # slots for a delay that may drift
 LONGER = (2.0, 5.0, 12.0, 30.0)  # [samples] first guesses of a longer delay
 

@@ -228,9 +228,8 @@ class Element:
     # (**parameters) -> names and sizes of other elements that together give the same force while the machine moves
     moving_as: Callable[..., tuple[tuple[str, float], ...]] | None = None
     reversing: bool = False  # is told from dry friction by the way after a reversal of the motion alone
-    drifts: bool = (
-        False  # changes with time what the drive passes through: a gain that fades, a clock, a delay
-    )
+    # changes with time what the drive passes through: a gain that fades, a clock, a delay
+    drifts: bool = False
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
     ranges: Callable[[Scales], Mapping[str, tuple[float, float]]] | None = None
     hops: Callable[[Scales], Mapping[str, float]] | None = None

@@ -11,9 +11,8 @@ GAINED = (  # one effect of each kind that a slot of the signal path may gain
     "input_delay", "actuator_gain", "coulomb_friction", "viscous_damper", "constant_force", "measurement_delay",
     "sensor_gain", "sensor_offset",
 )  # fmt: skip
-SAME = {
-    "viscous_damper": ("switched_damper",)
-}  # elements of the model with a parameter that already does the same
+# elements of the model with a parameter that already does the same
+SAME = {"viscous_damper": ("switched_damper",)}
 SHARP = 0.05  # share of the usual speed over which the sign of an added friction changes
 INERTIA_SLOT = "inertia"
 

@@ -253,9 +253,8 @@ def motion_of(stretch: Stretch, model: Model, frequency: float, low: float = 0.0
         base, base_rate, base_acceleration = _derivatives(time, drive)
     elif stretch.kind == "base_acceleration":
         base_acceleration = drive
-    relative = (
-        stretch.kind == "base_acceleration"
-    )  # the motion is then relative to the base, and the mass moves with the base as well
+    # the motion is then relative to the base, and the mass moves with the base as well
+    relative = stretch.kind == "base_acceleration"
     if stretch.measured == "position":
         position, velocity, acceleration = _derivatives(time, smooth)
     elif stretch.measured == "velocity":

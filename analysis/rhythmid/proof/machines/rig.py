@@ -48,9 +48,8 @@ class Rig:
         scaled = replace(self.forcing, amplitude=self.forcing.amplitude * run.forcing)
         inside = [effect for effect in effects if effect != self.lacks]
         moved = self.recorded == "base"
-        sent = (
-            replace(run, rate=FINER * run.rate) if moved else run
-        )  # the motion of a base is smooth between samples, too
+        # the motion of a base is smooth between samples, too
+        sent = replace(run, rate=FINER * run.rate) if moved else run
         return observe(
             self.machine, inside, scaled, sent.time, sent.command, self.input_delay, self.measurement_delay,
             slopes=sent.slopes if moved else None, start=run.start, velocity=self.velocity, samples=run.time, lag=self.lag,
