@@ -52,9 +52,8 @@ def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Iterable[in
     # What was inherited is not this process's to collect: going through it would copy the parent's memory, and may
     # meet frames of threads that exist in the parent only.
     gc.freeze()
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # an interruption is meant for the parent, which ends its workers
+    # an interruption is meant for the parent, which ends its workers
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     for index in own:
         try:
             answer = (index, function(items[index]), None)

@@ -214,13 +214,11 @@ class Element:
     rigid: bool = False
     candidate: bool = True  # used in the search for missing effects
     needless_with: tuple[str, ...] = ()
-    beyond: tuple[
-        str, ...
-    ] = ()  # effects that together are the law where a parameter is at the end of its range
+    # effects that together are the law where a parameter is at the end of its range
+    beyond: tuple[str, ...] = ()
     same_as: tuple[str, ...] = ()  # elements that give the same model with other parameters
-    same_beside: Mapping[str, str] = field(
-        default_factory=dict
-    )  # equivalences that hold beside another element
+    # equivalences that hold beside another element
+    same_beside: Mapping[str, str] = field(default_factory=dict)
     rotational: bool = False  # applies only where the position is an angle
     controlled: bool = False  # applies only where a controller in the command path closes the loop
     displaced_base: bool = False  # differs from another element only where the input displaces the base

@@ -176,9 +176,8 @@ def freed_value(nominal: Model, fitted: Model, chosen: Hypothesis) -> str | None
         for name, held in ((name, nominal.parameters[name]) for name in freed)
     ]
     what = "that value" if len(freed) == 1 else "these values"
-    file = any(
-        name.startswith(f"{BODY}.") for name in freed
-    )  # the file of a body does not mark free parameters
+    # the file of a body does not mark free parameters
+    file = any(name.startswith(f"{BODY}.") for name in freed)
     return (
         f"{'. '.join(values)}, and that{beside} predicts the records better than any effect does while it is held: check {what}"
         f"{'' if file else ', or drop its ' + repr('fixed: true')}."

@@ -319,9 +319,8 @@ class Balance:
             for term in reversed([t for t in model.terms if t.element.slot == slot]):
                 if self._counts(term, model):
                     required = self._before(motion, term, model, required, leg, by)
-        if (
-            self.by_reference
-        ):  # the command path's effect is on this side, so that the rows stay the same for all models
+        # the command path's effect is on this side, so that the rows stay the same for all models
+        if self.by_reference:
             required = required + motion.effort - self._asked(index, model, self.shift(model))
         return required
 

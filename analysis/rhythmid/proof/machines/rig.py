@@ -13,9 +13,8 @@ from rhythmid.proof.protocol import Run
 Array = NDArray[np.float64]
 Rng = np.random.Generator
 FINER = 8  # knots of a smooth command for each sample
-Recorded = Literal[
-    "command", "effort", "base", "reference", "nothing"
-]  # the recorded channel that drives the machine
+# the recorded channel that drives the machine
+Recorded = Literal["command", "effort", "base", "reference", "nothing"]
 
 
 @dataclass(frozen=True)
@@ -88,9 +87,8 @@ class Design:
         return tuple(name for effect in effects for name in self.known_with.get(effect, ()))
 
 
-LAGS = frozenset(
-    {"command_lag", "actuator_lag", "sensor_lag"}
-)  # indistinguishable in a linear machine with one input
+# indistinguishable in a linear machine with one input
+LAGS = frozenset({"command_lag", "actuator_lag", "sensor_lag"})
 
 
 def log_uniform(rng: Rng, low: float, high: float) -> float:
