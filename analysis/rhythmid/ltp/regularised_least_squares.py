@@ -228,9 +228,6 @@ def estimate_htf(operator: RegularisedLeastSquares) -> HtfEstimate:
     noise = float(np.sqrt(np.sum(np.abs(residual) ** 2) / (used.sum() - taken)))
     keep = operator.positive
     htf = HarmonicTransferFunctions(
-        operator.harmonics,
-        operator.frequency[keep],
-        found[:, keep],
-        noise * gain[:, keep],
+        operator.harmonics, operator.frequency[keep], found[:, keep], noise * gain[:, keep]
     )
     return HtfEstimate(htf, operator.reached[:, keep], operator, noise, found)

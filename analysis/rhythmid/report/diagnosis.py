@@ -3,17 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rhythmid.report.blocks import (
-    Block,
-    Bullets,
-    Equation,
-    Heading,
-    Paragraph,
-    Section,
-    Table,
-    Tile,
-    Tiles,
-)
+from rhythmid.report.blocks import Block, Bullets, Equation, Heading, Paragraph, Section, Table, Tile, Tiles
 from rhythmid.report.correlation import correlation_figure
 from rhythmid.report.findings import Findings
 from rhythmid.report.hypotheses import hypotheses_section, rejections_section
@@ -236,10 +226,7 @@ def _better(found: Findings) -> Section:
             lead += f", and {percent(fit['refitted_nominal']['heldout_nrmse'])} on data that no fit has seen"
     said = f"{sentence(str(result.get('heldout') or 'nothing was held out'))} {_scored(result['scoring'])}"
     as_given = result["detection"]["nominal_nrmse"]
-    blocks: list[Block] = [
-        Paragraph(f"{lead}.", "lead"),
-        Paragraph(said),
-    ]
+    blocks: list[Block] = [Paragraph(f"{lead}.", "lead"), Paragraph(said)]
     if as_given is not None:
         blocks.append(Paragraph(f"Before any refit, the nominal model as given: {percent(as_given)}."))
     if found.runs:

@@ -364,12 +364,7 @@ class Balance:
     def _force(self, index: int, term: Term, model: Model) -> Array:
         """Force (n,) of an element that depends only on the motion. Cached: most refits change one element."""
         borrowed = tuple(model.borrowed(source, default) for source, default in term.element.borrows.values())
-        key = (
-            index,
-            term.element.name,
-            tuple((name, v.value) for name, v in term.values.items()),
-            borrowed,
-        )
+        key = (index, term.element.name, tuple((name, v.value) for name, v in term.values.items()), borrowed)
         found = self._forces.get(key)
         if found is None:
             zero = np.zeros(len(self.motions[index].time))
