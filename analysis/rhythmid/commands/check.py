@@ -1,13 +1,16 @@
 """`rhythmid check`: what is in recordings, and how good their timing is."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rhythmid.commands.options import Elements, JsonFile, Quiet, ReportFile, SignalsFile, command_line
 from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new, write_json
+
+if TYPE_CHECKING:
+    from rhythmid.record.bag_report import BagReport
 
 EXAMPLES = (
     "rhythmid check bag",
@@ -48,8 +51,6 @@ def check(
     With --strict, exit code 1 if a recording has gaps, samples that are left out, damage, or anything else that may change an answer.
     """
     from rhythmid.errors import InputError
-    from rhythmid.progress_bar import progress
-    from rhythmid.record.bag_report import BagReport, quality_report
     from rhythmid.record.joint_record import joint_records
     from rhythmid.record.separate_zeros import separate_zeros_notes
 
@@ -59,20 +60,7 @@ def check(
             "--report makes the page of one recording; give one, or list them for `rhythmid batch`"
         )
     terminal = Terminal(quiet, json)
-    made: list[BagReport] = []
-    refused: list[str] = []
-    for bag in bags:
-        try:
-            with progress(terminal.progress, log=False) as tell:
-                tell(f"reading {bag}")
-                found = quality_report(bag, signals)
-        except InputError as error:  # not a recording; the others are reported nevertheless
-            refused.append(str(error))
-            continue
-        made.append(found)
-        refused += found.problems
-        for line in found.lines():
-            terminal.say(line)
+    made, refused = _reported(bags, signals, terminal)
     records = [found.record for found in made if found.usable and found.record is not None]
     elsewhere = separate_zeros_notes(records)
     for line in elsewhere:
@@ -101,3 +89,28 @@ def check(
     if strict and matters:
         terminal.say(f"--strict: {len(matters)} of the remarks may change an answer, the first: {matters[0]}")
         raise typer.Exit(1)
+
+
+def _reported(
+    bags: list[Path], signals: Path | None, terminal: Terminal
+) -> tuple[list["BagReport"], list[str]]:
+    """Reports of the recordings, and why some cannot be used."""
+    from rhythmid.errors import InputError
+    from rhythmid.progress_bar import progress
+    from rhythmid.record.bag_report import quality_report
+
+    made: list[BagReport] = []
+    refused: list[str] = []
+    for bag in bags:
+        try:
+            with progress(terminal.progress, log=False) as tell:
+                tell(f"reading {bag}")
+                found = quality_report(bag, signals)
+        except InputError as error:  # not a recording; the others are reported nevertheless
+            refused.append(str(error))
+            continue
+        made.append(found)
+        refused += found.problems
+        for line in found.lines():
+            terminal.say(line)
+    return made, refused

@@ -17,6 +17,7 @@ from rhythmid.commands.options import (
     command_line,
 )
 from rhythmid.commands.terminal import Terminal
+from rhythmid.errors import InputError
 from rhythmid.output import require_new, write_json
 
 EXAMPLES = (
@@ -79,7 +80,6 @@ def identify(
 ) -> None:
     """Find a model's parameters, the command and measurement delays, and the harmonic transfer functions."""
     from rhythmid.elements.catalogue import load_catalogue
-    from rhythmid.errors import InputError
     from rhythmid.identify.identifiability import Forcing, offset_of
     from rhythmid.identify.identify import Method
     from rhythmid.identify.identify import identify as find
@@ -101,13 +101,9 @@ def identify(
         )
         return
     method, htf = method or "joint", htf or "auto"
-    for option, given, kind in (
-        ("method", method, Method),
-        ("htf", htf, HtfMethod),
-        ("forcing", forcing, Forcing),
-    ):
-        if given is not None and given not in get_args(kind):
-            raise InputError(f"--{option} {given}: one of {', '.join(get_args(kind))} is expected")
+    _check("method", method, get_args(Method))
+    _check("htf", htf, get_args(HtfMethod))
+    _check("forcing", forcing, get_args(Forcing))
     offset = offset_of(clock_offset, clock_offset_std)
     if offset is not None and forcing not in (None, "clock_unknown"):
         raise InputError(
@@ -136,3 +132,8 @@ def identify(
 
         name = "the paper's hopper" if model is None else model.name
         terminal.report(report, present(found, command_line(), name))
+
+
+def _check(option: str, given: str | None, known: tuple[str, ...]) -> None:
+    if given is not None and given not in known:
+        raise InputError(f"--{option} {given}: one of {', '.join(known)} is expected")

@@ -100,9 +100,8 @@ def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tupl
     effort = np.sum(efforts, axis=0) if efforts else None
     highest = min(bandwidth(value, grid.period), 0.5 / step)
     pumped = active_pumping(recording)
-    noise = math.hypot(white_level(recording.output.value), white_level(simulation.output.value)) / math.sqrt(
-        block
-    )
+    levels = (white_level(one.output.value) for one in (recording, simulation))
+    noise = math.hypot(*levels) / math.sqrt(block)
     oscillator = None if effort is None else oscillator_of(effort, simulated, step, frequency, highest)
     if oscillator is None:
         oscillator = _free(

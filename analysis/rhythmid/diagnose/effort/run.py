@@ -148,8 +148,7 @@ def effort_run(
             promising,
         )  # fmt: skip
     case.tell("weighing the hypotheses on data that no fit has seen")
-    rows = _rows(case, found, unseen)
-    size = variation_of(found.balance)
+    rows, size = _rows(case, found, unseen), variation_of(found.balance)
     predicted = {one.elements: rows.predicted(one) for one in found.hypotheses}
     ruled_out = {one.elements: rows.predicted(one) for one in found.ruled_out}
     left = remainder_of(found.balance, found.chosen)
