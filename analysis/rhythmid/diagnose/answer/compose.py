@@ -148,7 +148,7 @@ def _alternatives(found: Search, contest: Contest) -> tuple[Alternative, ...]:
     )
 
 
-def _next(found: Search, decision: Decision, groups: Sequence[Sequence[str]]) -> str:
+def _next(found: Search, decision: Decision, groups: tuple[tuple[str, ...], ...]) -> str:
     """The experiment that separates the models that the records do not."""
     best = found.best
     rivals = [one for one in found.trials if _rivals(one, best, groups)]
