@@ -25,7 +25,7 @@ from rhythmid.identify.identifiability import Forcing, Offset, delays_of, of_tol
 from rhythmid.identify.identification import Delays, Estimate, Identification, Shown
 from rhythmid.identify.inner_delays import dead_times
 from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit, explained
-from rhythmid.identify.large_shifts import large_shifts, tells_nothing
+from rhythmid.identify.large_shifts import AGREES, large_shifts, tells_nothing
 from rhythmid.identify.moving import moving
 from rhythmid.identify.natural_size import are_told
 from rhythmid.identify.output_error import Fit
@@ -54,7 +54,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Method = Literal["joint", "paper"]
-CLOSED = 5.0  # standard deviations of the closure above which a note is given
 FRACTION = 0.01  # share of a sample period: a smaller closure is a numerical error, whatever its std
 SOURCES = {
     "forcing channel": "the recorded forcing",
@@ -383,7 +382,7 @@ def _told_values(fit: Fit, delays: Delays) -> dict[str, Estimate]:
 def _open(delays: Delays, period: float) -> bool:
     """Whether limit cycle and response to the command give different delays; `period` is the sample period [s]."""
     seen = delays.observables
-    if seen is None or delays.closure is None or abs(delays.closure) <= CLOSED:
+    if seen is None or delays.closure is None or abs(delays.closure) <= AGREES:
         return False
     gap = (seen.phase.value or 0.0) + (seen.offset.value or 0.0) - (seen.slope.value or 0.0)
     return abs(gap) > FRACTION * period

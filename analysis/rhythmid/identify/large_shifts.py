@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from rhythmid.identify.caution import Caution
+from rhythmid.identify.early_output import SURE
 from rhythmid.identify.identification import Delays, Estimate
 from rhythmid.identify.plausibility import gains
 from rhythmid.model import Model
@@ -17,9 +18,7 @@ TIMES = 4.0  # ratio of an estimate to the nominal value above which the shift i
 # sample periods by which a delay may exceed the nominal one: a longer one is seldom transport delay alone
 SAMPLES = 10.0
 PASSED_BY = 2.0  # standard deviations by which an estimate has to exceed a limit
-# standard deviations, and a share of a sample, by which a delay has to be negative to be reported: with two
-# standard deviations, a machine without delay would be reported once in 40 times
-EARLY, EARLY_LEAST = 4.0, 0.05
+EARLY_LEAST = 0.05  # share of a sample by which a delay has to be negative to be reported
 # standard deviations of the closure within which limit cycle and response agree about the delays
 AGREES = 5.0
 ABSORBING = "the fit may be absorbing missing physics"
@@ -84,7 +83,7 @@ def _times(ratio: float) -> str:
 def _negative_delays(nominal: Model, delays: Delays, period: float) -> Iterator[Caution]:
     """Negative delays, with which the machine would respond before the command."""
     for side, found, expected in _estimated(nominal, delays):
-        if found.value is None or found.value >= -max(EARLY * (found.std or 0.0), EARLY_LEAST * period):
+        if found.value is None or found.value >= -max(SURE * (found.std or 0.0), EARLY_LEAST * period):
             continue
         yield Caution(
             "negative_delay",
