@@ -21,9 +21,8 @@ Array = NDArray[np.float64]
 # differences of a spline's coefficients, or values of a function of the motion and its past. The smallest leaves straight
 # lines, the largest a tenth of the effort for every piece
 RIDGES = (0.3, 0.1, 0.03, 0.01, 0.003)
-STRAIGHT = (
-    3.0  # standard deviation of the straight part, in the same unit: a line may carry all of the effort
-)
+# standard deviation of the straight part, in the same unit: a line may carry all of the effort
+STRAIGHT = 3.0
 PASSES = 8  # iterations of reweighted least squares
 HISTORY = "the motion and its past"  # the quantity of a map of several quantities and their past
 
