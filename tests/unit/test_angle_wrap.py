@@ -45,6 +45,21 @@ def test_what_does_not_go_on_against_its_jumps_by_a_turn_is_no_wrapped_angle(val
     assert noted(value) == ()
 
 
+def test_an_angle_within_a_turn_is_unwrapped_on_either_side_of_a_gap_in_which_any_motion_may_be():
+    value = (TURNING + np.pi) % (2.0 * np.pi) - np.pi
+    jump = int(np.flatnonzero(np.abs(np.diff(value)) > np.pi)[1])
+    for begin, lost in ((jump - 20, 60), (jump + 300, 400)):  # across a jump, and more than half a turn
+        kept = np.delete(np.arange(len(TIME)), np.s_[begin : begin + lost])
+        channel = Channel(TIME[kept], value[kept], "rad")
+        assert wrap_notes(Record("run", channel))
+        off = unwrapped(Record("run", channel)).output.value - TURNING[kept]
+        for side in (off[:begin], off[begin:]):
+            np.testing.assert_allclose(side, side[0], atol=1e-9)
+        assert (off[begin] - off[0]) / (2.0 * np.pi) == pytest.approx(
+            round((off[begin] - off[0]) / (2.0 * np.pi))
+        )
+
+
 def test_a_length_has_no_turn():
     assert noted(TURNING % (2.0 * np.pi), "m") == ()
 
