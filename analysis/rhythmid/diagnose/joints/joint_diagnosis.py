@@ -26,7 +26,7 @@ from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, nam
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.link_cause import feels, likely_link
 from rhythmid.diagnose.joints.link_exchange import exchanged
-from rhythmid.diagnose.joints.misfit import braking, misfits
+from rhythmid.diagnose.joints.misfit import braking, late_efforts, misfits
 from rhythmid.diagnose.joints.stated_fit import stated_parameters
 from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
@@ -146,6 +146,7 @@ def diagnose_machine(
         *put_right,
         *(one.words for one in best.gears.values()),
         *misfits(answers, braking(best.found, machine)),
+        *late_efforts(best.found),
     )
     diagnosis = compose_machine(
         machine,
