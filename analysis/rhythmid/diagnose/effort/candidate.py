@@ -213,9 +213,11 @@ def _column(balance: Balance, parent: EffortFit, start: Start, base: Array) -> A
 
 
 def late_start(balance: Balance, parent: EffortFit) -> tuple[Alignment, float]:
-    """Allowed range of a longer delay, and the delay [s] that fits best with the parent's parameters to first order."""
+    """Allowed range of a longer delay, and the delay [s] that fits best with the parent's parameters to first order.
+
+    A delay is not negative: an effort that was recorded after the motion, such as a filtered one, is no effect of the machine.
+    """
     most = max(LONGEST_DELAY / balance.bandwidth.dominant, 2.0 * balance.period)
-    usual = Alignment.of(balance)
     required = balance.required(parent.model)
     weight = weights_of(parent.residual, parent.scale) / parent.scale**2
     root = np.sqrt(weight)
@@ -227,7 +229,7 @@ def late_start(balance: Balance, parent: EffortFit) -> tuple[Alignment, float]:
         error = error - basis @ (basis.T @ error)
         if float(error @ error) < best:
             best, place = float(error @ error), float(late)
-    return Alignment(most, usual.low, most), place
+    return Alignment(most, 0.0, most), place
 
 
 def widest(balance: Balance, column: Array) -> float:
