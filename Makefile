@@ -8,6 +8,9 @@ METADATA := $(wildcard $(foreach package,$(PACKAGES),$(addprefix $(package)/,*.p
 UPLOT    := analysis/rhythmid/report/vendor/uplot
 UPLOT_VERSION := 1.6.32
 
+# whatever the shell says, modules are compiled once and not by every process: the tests start hundreds
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help install test test-long lint format demo demo-leg docs picture benchmark naming docker dist vendor lock clean
 

@@ -9,8 +9,9 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import cache, lru_cache
 from importlib.machinery import SourceFileLoader
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import CodeType, ModuleType
 
@@ -84,6 +85,18 @@ def _files(folder: Path) -> Iterator[Path]:
             yield path
 
 
+@cache
+def _built_in() -> tuple[Element, ...]:
+    """The package's own elements, whose files are read once; those of users may change between two calls."""
+    return tuple(load_element(path) for slot in SLOTS for path in _files(BUILT_IN / slot))
+
+
+@lru_cache(maxsize=8)
+def _declared(search_path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """Elements of the packages that are installed along Python's search path; every package's metadata is read for them."""
+    return tuple(entry_points(group=ENTRY_POINT_GROUP))
+
+
 @dataclass(frozen=True)
 class Catalogue(Mapping[str, Element]):
     """Elements by name."""
@@ -140,10 +153,9 @@ def load_catalogue(folders: Iterable[str | Path] = ()) -> Catalogue:
             )
         found[element.name] = element
 
-    for slot in SLOTS:
-        for path in _files(BUILT_IN / slot):
-            add(load_element(path))
-    for entry in entry_points(group=ENTRY_POINT_GROUP):
+    for element in _built_in():
+        add(element)
+    for entry in _declared(tuple(sys.path)):
         add(replace(entry.load(), source=entry.value))
     for given in folders:
         folder = Path(given)

@@ -25,6 +25,8 @@ SAMPLES = 1000  # samples of the cycle
 RELAXATION = 10  # periods simulated where Newton's method fails
 SETTLING = 8  # periods simulated before Newton's method starts
 DIVERGES = "the model diverges under its forcing; check its parameters"
+# reduction of the error in a step up to which Newton's method keeps its Jacobian, which costs two runs a state
+STILL_GOOD = 0.1
 TOLERANCE = 1e-11  # tolerance of the fixed point, relative to the motion
 
 
@@ -186,7 +188,7 @@ def limit_cycle(
     else:
         start = np.asarray(guess, dtype=float)
     grid = np.linspace(0.0, pumping.period, SAMPLES + 1)
-    before = np.inf
+    before, jacobian = np.inf, None
     for _ in range(patience // RELAXATION):
         rows = period_map.rows(start, grid)
         states = rows[:, : len(start)]
@@ -196,12 +198,13 @@ def limit_cycle(
         if error < TOLERANCE or (error < 1e-8 and error > 0.5 * before):
             break
         if error < 0.5 * before:
-            jacobian = period_map.jacobian(start, scale)
+            if jacobian is None or error > STILL_GOOD * before:
+                jacobian = period_map.jacobian(start, scale)
             start = start + np.linalg.lstsq(np.eye(len(start)) - jacobian, difference, rcond=1e-9)[0]
             before = error
         else:  # Newton's method fails here, but the cycle is attractive
             start = period_map.relaxed(start, RELAXATION)
-            before = np.inf
+            before, jacobian = np.inf, None
     if error > 1e-6:
         raise InputError(
             f"no limit cycle found: after {patience} periods of {pumping.period:.4g} s the motion still differs from one "

@@ -1,7 +1,7 @@
 """Linearisation of any model around its limit cycle: the periodic matrices A(t), B(t), C(t), D(t) of equation (1).
 
 The Jacobian is taken by differences of the compiled right-hand side along the cycle. Where it jumps (a damper switches, a
-contact opens) the instant is found by bisection, and Fourier coefficients are integrated piece by piece between these
+contact opens) the instant is found by dividing intervals, and Fourier coefficients are integrated piece by piece between these
 instants: for the paper's plant that gives the coefficients of s(t) in (13) exactly from its switch times. Where the
 force itself jumps, perturbed motions cross the jump earlier or later: ξ becomes S ξ with the saltation matrix S (P. C.
 Müller, Chaos, Solitons & Fractals 5 (1995) 1671). In A(t) that is an impulse J δ(t − t_s). A Fourier series takes the mean
@@ -23,6 +23,8 @@ PANELS = 96  # of the quadrature, in a period
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 SMALLEST = 1e-3  # least jump relative to the variation of the quantity
 STRETCH = 2e-3  # periods before and after a jump of the force over which its effect is measured
+# parts of an interval that are evaluated at once in the search for a jump: a call costs more than its points
+SECTIONS = 128
 STEP = 1e-6  # of the differences, relative to the motion
 
 
@@ -117,22 +119,22 @@ class _Jacobian:
         return self.rates(time, self.cycle.path(time)[None])[0, :, : len(self.steps)]
 
 
-def _bisect(
+def _narrowed(
     signal: Callable[[Array], Array], low: Array, high: Array, rounds: int
 ) -> tuple[Array, Array, Array]:
-    """Halve each interval [low, high] towards the side across which the signal (n, k) changes more.
+    """Divide each interval [low, high] into `SECTIONS` and keep the one across which the signal (n, k) changes most, in
+    `rounds` rounds.
 
     Returns the ends and the largest remaining change (n,) across them.
     """
-    at_low, at_high = signal(low), signal(high)
+    each, change = np.arange(len(low)), np.zeros(len(low))
     for _ in range(rounds):
-        middle = 0.5 * (low + high)
-        at_middle = signal(middle)
-        left = np.abs(at_middle - at_low).max(axis=1) > np.abs(at_high - at_middle).max(axis=1)
-        high, low = np.where(left, middle, high), np.where(left, low, middle)
-        at_high = np.where(left[:, None], at_middle, at_high)
-        at_low = np.where(left[:, None], at_low, at_middle)
-    return low, high, np.abs(at_high - at_low).max(axis=1)
+        grid = np.linspace(low, high, SECTIONS + 1)
+        values = signal(grid.ravel()).reshape(*grid.shape, -1)
+        changes = np.abs(np.diff(values, axis=0)).max(axis=2)
+        most = changes.argmax(axis=0)
+        low, high, change = grid[most, each], grid[most + 1, each], changes[most, each]
+    return low, high, change
 
 
 def _jumps(jacobian: _Jacobian) -> tuple[Array, Array]:
@@ -152,12 +154,12 @@ def _jumps(jacobian: _Jacobian) -> tuple[Array, Array]:
     candidate = change > np.maximum(4.0 * np.median(change), SMALLEST)
     if not candidate.any():
         return np.empty(0), steep
-    first, last, left = _bisect(signal, low[candidate], high[candidate], 7)
+    first, last, left = _narrowed(signal, low[candidate], high[candidate], 1)
     # a smooth change is spread over the interval, a jump is not; differences smear it over 1e-6 of the period
     jumped = left > 0.5 * change[candidate]
     if not jumped.any():
         return np.empty(0), steep
-    first, last, _ = _bisect(signal, first[jumped], last[jumped], 14)
+    first, last, _ = _narrowed(signal, first[jumped], last[jumped], 2)
     times = np.sort(np.mod(0.5 * (first + last), period))
     apart = np.concatenate([[True], np.diff(times) > 1e-9 * period]) if len(times) else np.empty(0, bool)
     return times[apart], steep
