@@ -84,6 +84,15 @@ def test_records_in_units_a_thousand_apart_are_refused_by_name(given, factor):
     check_comparable(prepare(given))
 
 
+def test_records_of_one_sine_each_are_of_one_machine_however_small_the_fastest_motion_is(given):
+    """A mass without a spring moves by a four-hundredth when it is driven at twenty times the frequency."""
+    slow, fast = (
+        replace(one, output=replace(one.output, value=size * (1.0 + np.sin(pulse * one.output.time))))
+        for one, size, pulse in ((given[0], 1.0, 6.0), (given[1], 1.0 / 400.0, 120.0))
+    )
+    check_comparable(prepare([slow, fast]))
+
+
 @pytest.mark.parametrize("zero", [-80.0, 327.0])
 def test_records_whose_encoders_have_zeros_far_apart_are_of_one_machine(given, zero):
     other = replace(given[1], output=replace(given[1].output, value=given[1].output.value + zero))

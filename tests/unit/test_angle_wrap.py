@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+from legged import MODELS
 
+from rhythmid.body.machine import Machine
 from rhythmid.diagnose.admission import admitted
 from rhythmid.model import Model
 from rhythmid.record.angle_wrap import unwrapped, wrap_notes
 from rhythmid.record.bag_report import quality_report
-from rhythmid.record.cleaning import cleaned
+from rhythmid.record.cleaning import cleaned, cleaned_joints
+from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.read import read_record
 from rhythmid.record.record import Channel, Record
 from rhythmid.start.start import guess, start
@@ -45,6 +48,21 @@ def test_what_does_not_go_on_against_its_jumps_by_a_turn_is_no_wrapped_angle(val
     assert noted(value) == ()
 
 
+def test_an_angle_within_a_turn_is_unwrapped_on_either_side_of_a_gap_in_which_any_motion_may_be():
+    value = (TURNING + np.pi) % (2.0 * np.pi) - np.pi
+    jump = int(np.flatnonzero(np.abs(np.diff(value)) > np.pi)[1])
+    for begin, lost in ((jump - 20, 60), (jump + 300, 400)):  # across a jump, and more than half a turn
+        kept = np.delete(np.arange(len(TIME)), np.s_[begin : begin + lost])
+        channel = Channel(TIME[kept], value[kept], "rad")
+        assert wrap_notes(Record("run", channel))
+        off = unwrapped(Record("run", channel)).output.value - TURNING[kept]
+        for side in (off[:begin], off[begin:]):
+            np.testing.assert_allclose(side, side[0], atol=1e-9)
+        assert (off[begin] - off[0]) / (2.0 * np.pi) == pytest.approx(
+            round((off[begin] - off[0]) / (2.0 * np.pi))
+        )
+
+
 def test_a_length_has_no_turn():
     assert noted(TURNING % (2.0 * np.pi), "m") == ()
 
@@ -57,6 +75,20 @@ def test_check_says_it(tmp_path):
     )
     lines = quality_report(tmp_path / "run.csv", tmp_path / "signals.yaml").lines()
     assert any("jumps by 2π rad" in line for line in lines)
+
+
+def test_a_joint_that_turns_is_unwrapped_without_a_stated_unit_and_one_that_slides_is_not():
+    machine = Machine.load(MODELS / "leg.yaml")
+    within = Channel(
+        TIME, TURNING % (2.0 * np.pi), "m"
+    )  # the unit that signals of a joint have if they state none
+    joints = {name: Record("run", within, reference=within) for name in machine.joints}
+    (record,), notes = cleaned_joints([JointRecord("run", joints, joints["knee"])], machine.turning)
+    for one in record.joints.values():
+        for channel in (one.output, one.reference):
+            np.testing.assert_allclose(channel.value - TURNING, channel.value[0] - TURNING[0], atol=1e-9)
+    assert record.base is not None and not np.any(record.base.output.value - within.value)  # a rail
+    assert sum("jumps by 2π rad" in note for note in notes) == 1
 
 
 SERVO = """

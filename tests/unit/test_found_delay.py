@@ -7,6 +7,7 @@ import pytest
 from axes import axis, axis_model
 
 from rhythmid.diagnose.answer.wording import unstated_delay
+from rhythmid.diagnose.effort.candidate import late_start
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.found_delay import delay_told, found_delay, with_found_delay
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -56,6 +57,15 @@ def test_a_delay_at_the_limit_of_the_fit_has_no_standard_deviation():
     assert one.fit.at_limit[0]
     assert found_delay(balance, one).std is None
     assert delay_told(balance, one, NOMINAL) == ()
+
+
+def test_an_effort_that_is_stamped_after_the_motion_has_no_delay():
+    balance = Balance.of([delayed(-4.0 * PERIOD)], NOMINAL)
+    usual = fit_effort(balance, NOMINAL)
+    assert usual.at_limit[0] and usual.alignment < 0.0
+    aligned, start = late_start(balance, usual)
+    longer = fit_effort(balance, NOMINAL, aligned=aligned, alignment=start)
+    assert longer.alignment == 0.0 and longer.cost > usual.cost
 
 
 def test_an_effort_of_a_slower_sensor_is_aligned_in_its_own_samples():

@@ -13,6 +13,7 @@ from rhythmid.identify.output_error import start_only
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
+from rhythmid.record.back_and_forth import goes_back_and_forth
 from rhythmid.simulation.signal import first_order_hold
 
 FREE = """
@@ -84,3 +85,14 @@ def test_a_motion_that_meets_each_speed_once_shows_laws_of_its_speed_alone():
         found = candidates(CATALOGUE, free().setting, scales([coasting], free()))
         assert all((found.not_tried.get(name) == DYING) is not told for name in untold)
         assert {"quadratic_drag", "coulomb_friction"} <= {element.name for element, _ in found.tried}
+
+
+@pytest.mark.parametrize(
+    ("turns", "shown"),
+    [((0.0, 1.0, -1.0, -0.1), True), ((0.0, 1.0, 0.4), True), ((0.0, 1.0, 0.6), False), ((-1.0, 1.0), False)],
+    ids=["a cycle that is not closed", "more than half of the way back", "less than that", "one way"],
+)
+def test_a_motion_comes_back_when_it_passes_half_of_its_travel_both_ways(turns, shown):
+    """Wherever in its cycle the record begins."""
+    place = np.interp(TIME, np.linspace(TIME[0], TIME[-1], len(turns)), turns)
+    assert goes_back_and_forth([place]) is shown

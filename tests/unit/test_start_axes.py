@@ -72,3 +72,45 @@ def test_a_first_word_of_several_joints_is_refused(tmp_path) -> None:
     np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header=",".join(columns), comments="")
     with pytest.raises(InputError, match="no joint is called 'Swing'; it has swing_left, swing_up"):
         guess(tmp_path / "run.csv", joint="Swing")
+
+
+def machine_tool(folder: Path, letters: tuple[str, ...]) -> Path:
+    """Columns of a spindle, which moves most, and of axes that are called by letters."""
+    columns = {"Time": TIME}
+    for seed, name in enumerate(("S1", *(f"{letter}1" for letter in letters))):
+        position, force = axis(seed, 1.0 / (1.0 + seed))
+        columns |= {f"{name}_ActualPosition": position, f"{name}_CurrentFeedback": force}
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(folder / "run.csv", rows, delimiter=",", header=",".join(columns), comments="")
+    return folder / "run.csv"
+
+
+@pytest.mark.parametrize(("wanted", "name"), [(None, "S1"), ("X", "X1"), ("y", "Y1")])
+def test_the_axes_of_a_machine_tool_are_called_by_their_letters(tmp_path, wanted, name) -> None:
+    source = machine_tool(tmp_path, ("X", "Y", "Z"))
+    assert roles_of(source, joint=wanted) == {
+        "output": f"{name}_ActualPosition",
+        "input": f"{name}_CurrentFeedback",
+    }
+
+
+def test_the_letters_of_a_vector_are_no_axes(tmp_path) -> None:
+    """A vector has one quantity."""
+    columns = {
+        "Time": TIME,
+        **{f"tip position {letter}": axis(seed, 1.0)[0] for seed, letter in enumerate("xyz")},
+    }
+    columns["motor current"] = axis(0, 1.0)[1]
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header=",".join(columns), comments="")
+    assert not {"x", "y", "z"} & set(guess(tmp_path / "run.csv").roles.joint.motion)
+
+
+def test_the_output_is_a_motion_of_the_joint_that_was_asked_for(tmp_path) -> None:
+    """Not that of the motor, which is of no joint and moves more."""
+    columns = {"Time": TIME, "motor position": axis(0, 1.0)[0], "tip position z": axis(1, 0.1)[0]}
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header=",".join(columns), comments="")
+    assert (
+        guess(tmp_path / "run.csv", joint="tip").roles.choices["output"].recorded.column == "tip position z"
+    )

@@ -49,3 +49,10 @@ def test_what_is_constant_in_each_recording_and_steps_from_one_to_the_next_drive
 def test_what_is_the_same_in_all_recordings_drives_nothing(tmp_path):
     sources = [stepped(tmp_path, 60.0, name) for name in ("first", "second")]
     assert "input" not in start(sources).guess.roles.choices
+
+
+def test_the_part_that_may_be_used_is_told_on_the_clock_of_the_record(tmp_path):
+    table = np.loadtxt(stepped(tmp_path, 60.0), delimiter=";")
+    table[:, 1] += 13.0
+    np.savetxt(tmp_path / "late.csv", table, delimiter="; ")
+    assert f"# use: [{table[0, 1]:.6g}, {table[-1, 1]:.6g}]" in guess(tmp_path / "late.csv").signals

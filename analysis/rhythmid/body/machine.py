@@ -84,6 +84,12 @@ class Machine:
         """The joints with a path, in the file's order."""
         return tuple(self.paths)
 
+    @property
+    def turning(self) -> frozenset[str]:
+        """The joints whose positions are angles; "base" is the base's joint."""
+        found = {name for name, one in self.body.joints.items() if one.rotational}
+        return frozenset("base" if name == self.body.base else name for name in found)
+
     def controlled(self, joint: str) -> bool:
         """Whether a joint's command is a position reference for a controller in its path."""
         return any(term.element.name == "position_control" for term in self.paths[joint].terms)

@@ -36,7 +36,7 @@ def model_lines(
         from rhythmid.record.cleaning import cleaned_joints
 
         machine = Machine.load(path, catalogue)
-        check_joints(machine, cleaned_joints(joints)[0])
+        check_joints(machine, cleaned_joints(joints, machine.turning)[0])
         paths = "; ".join(f"{joint}: {_elements(model)}" for joint, model in machine.paths.items())
         return [f"{path}: {len(machine.joints)} joints; {paths}; {_free(machine.free)}"]
     model = Model.load(path, catalogue)

@@ -13,10 +13,10 @@ from rhythmid.elements.element import OFTEN_ENOUGH, Scales
 from rhythmid.identify.series import Series, displacement, dominant_frequency, record_of
 from rhythmid.identify.swing_frequency import swing_frequencies
 from rhythmid.model import Model
+from rhythmid.record.back_and_forth import goes_back_and_forth
 
 Array = NDArray[np.float64]
 REST_LENGTH = "linear_spring.rest_length"
-THERE_AND_BACK = 2.0  # least path length, in units of the travel, of a motion that comes back
 # parts of a record whose mean speeds show whether it only rises or only falls, and the share of their range by which noise may turn it
 PARTS, TURNED = 50, 0.05
 NO_SPRING = 1e-4  # share of the inertia's stiffness m ω² below which a spring sets no scale
@@ -83,15 +83,11 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
 
 
 def _comes_back(series: Sequence[Series], places: Sequence[Array]) -> bool:
-    """Whether in some record the path of the position is at least twice its travel."""
+    """Whether the position goes back and forth in some record."""
     by_record: dict[str, list[Array]] = {}
     for one, place in zip(series, places, strict=True):
         by_record.setdefault(record_of(one), []).append(place)
-    return any(
-        sum(float(np.abs(np.diff(one)).sum()) for one in some)
-        >= THERE_AND_BACK * float(np.ptp(np.concatenate(some)))
-        for some in by_record.values()
-    )
+    return any(map(goes_back_and_forth, by_record.values()))
 
 
 def _once(speed: Array) -> bool:

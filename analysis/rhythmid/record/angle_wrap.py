@@ -1,4 +1,7 @@
-"""Unwrapping of an angle that is read within a turn, or half a turn, and jumps between the ends of that range."""
+"""Unwrapping of an angle that is read within a turn, or half a turn, and jumps between the ends of that range.
+
+The step across a gap of a record shows no jump, because the motion in a gap may be any. Beyond a gap the angle goes on in the nearest turn.
+"""
 
 import math
 from dataclasses import replace
@@ -7,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.record.record import Channel, Record
+from rhythmid.record.timing import gaps_between
 
 Array = NDArray[np.float64]
 TURNS = {"2π": 2.0 * math.pi, "π": math.pi}  # [rad]; half a turn is the range of an arc tangent of a ratio
+NO_GAPS: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 
 
 def unwrapped(record: Record) -> Record:
@@ -20,7 +25,7 @@ def unwrapped(record: Record) -> Record:
     output = _unwrapped(record.output, turn)
     found = replace(record, output=output)
     reference = record.input if record.input_kind == "reference" else record.reference
-    if reference is None or reference.unit != record.output.unit or not len(wraps_by(reference.value, turn)):
+    if reference is None or reference.unit != record.output.unit or not len(_wraps_in(reference, turn)):
         return found
     asked = _unwrapped(reference, turn)
     # move the reference to the turn in which the machine is
@@ -46,7 +51,7 @@ def wraps_of(record: Record) -> str | None:
     if turn == 0.0:
         return None
     name = next(name for name, one in TURNS.items() if one == turn)
-    at = wraps_by(record.output.value, turn)
+    at = _wraps_in(record.output, turn)
     return (
         f"it jumps by {name} rad {len(at)} times, the first at t = {record.output.time[at[0] + 1]:.6g} s, as an angle does that is "
         "read within a turn: it is unwrapped"
@@ -57,16 +62,24 @@ def turn_of(record: Record) -> float:
     """The turn [rad] by which an output that is read within one jumps; 0 where it does not."""
     if record.output_kind != "position" or record.output.unit != "rad":
         return 0.0
-    return next((turn for turn in TURNS.values() if len(wraps_by(record.output.value, turn))), 0.0)
+    return next((turn for turn in TURNS.values() if len(_wraps_in(record.output, turn))), 0.0)
 
 
-def wraps_by(value: Array, turn: float) -> NDArray[np.intp]:
+def _wraps_in(channel: Channel, turn: float) -> NDArray[np.intp]:
+    """Indices (m,) of the steps of a channel that are jumps by a turn."""
+    if not (np.abs(np.diff(channel.value)) > 0.5 * turn).any():
+        return np.empty(0, dtype=np.intp)
+    return wraps_by(channel.value, turn, gaps_between(channel.time)[0])
+
+
+def wraps_by(value: Array, turn: float, gaps: NDArray[np.int64] = NO_GAPS) -> NDArray[np.intp]:
     """Indices (m,) of the steps of the values (n,) that are jumps by a turn; empty where any jump is something else.
 
     A jump is a turn minus the motion during the step. That motion is no larger than in other steps, and it goes in
-    the direction opposite to the jump.
+    the direction opposite to the jump. Steps across `gaps`, the indices (g,) of the samples before them, are left out.
     """
-    places = np.flatnonzero(np.diff(value))  # repeated values between readings are no motion
+    # repeated values between readings are no motion
+    places = np.setdiff1d(np.flatnonzero(np.diff(value)), gaps)
     step = np.diff(value)[places]
     jump = np.abs(step) > 0.5 * turn
     if not jump.any() or jump.all():

@@ -1,7 +1,7 @@
 """Cleaning: removes samples of the output that do not show the machine's position. It is the first step of every
 analysis."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -145,10 +145,12 @@ def peak_note(record: Record) -> str | None:
     )
 
 
-def cleaned_joints(records: Sequence[JointRecord]) -> tuple[list[JointRecord], tuple[str, ...]]:
-    """The recordings of a machine with each joint's record cleaned, and messages about it, one line each."""
+def cleaned_joints(
+    records: Sequence[JointRecord], turning: Collection[str] = ()
+) -> tuple[list[JointRecord], tuple[str, ...]]:
+    """The recordings of a machine with each joint's record cleaned, and messages about it, one line each; the positions of `turning` joints are angles."""
     made, notes = [], []
-    for whole in records:
+    for whole in (one.in_rad(turning) for one in records):
         joints = {joint: cleaned(record) for joint, record in whole.joints.items()}
         base = None if whole.base is None else cleaned(whole.base)
         parts = joints if base is None else {**joints, "base": base}

@@ -87,11 +87,23 @@ class JointRecord:
         joints = {name: record.cut(start, end) for name, record in self.joints.items()}
         return replace(self, joints=joints, base=None if self.base is None else self.base.cut(start, end))
 
+    def in_rad(self, turning: Collection[str]) -> "JointRecord":
+        """The record with the positions of `turning` joints, of which "base" is the base's, in rad: signals seldom state the unit of a joint."""
+        made = {name: _in_rad(one) if name in turning else one for name, one in self.every.items()}
+        base = None if self.base is None else made.pop("base")
+        return replace(self, joints=made, base=base)
+
     @property
     def span(self) -> tuple[float, float]:
         """First and last time [s] at which the positions of all joints are recorded."""
         times = [record.output.time for record in self.joints.values()]
         return max(float(one[0]) for one in times), min(float(one[-1]) for one in times)
+
+
+def _in_rad(record: Record) -> Record:
+    roles = ["output", "reference", *(["input"] if record.input_kind == "reference" else [])]
+    told = {role: one for role in roles if (one := getattr(record, role)) is not None}
+    return replace(record, **{role: replace(one, unit="rad") for role, one in told.items()})
 
 
 def names_joints(signals: str | Path) -> bool:

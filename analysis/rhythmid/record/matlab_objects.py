@@ -1,4 +1,4 @@
-"""Message about MATLAB files with nothing but objects, whose numbers only MATLAB can read."""
+"""Message about MATLAB files with nothing but objects that are not read."""
 
 from collections.abc import Mapping
 
@@ -16,4 +16,4 @@ def complaint_of_objects(objects: Mapping[str, str]) -> str:
     name, kind = next(iter(objects.items()))
     written = WRITTEN_BY.get(kind, "").format(name=name)
     mend = f"in MATLAB  {written}" if written else "in MATLAB save its numbers as arrays"
-    return f"{name!r} is an object of MATLAB's class {kind}, which no other program can read; {mend}"
+    return f"{name!r} is an object of MATLAB's class {kind}, whose numbers are not read here; {mend}"

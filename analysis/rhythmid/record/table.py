@@ -22,6 +22,7 @@ from rhythmid.record.hdf5_table import NUMBERS, is_hdf5, read_hdf5
 from rhythmid.record.joined_stamps import with_joined_stamps
 from rhythmid.record.json_table import JSON, read_json
 from rhythmid.record.lfs_pointer import check_content
+from rhythmid.record.matlab_class import signals_of
 from rhythmid.record.matlab_objects import complaint_of_objects
 from rhythmid.record.own_process import arrays_in_own_process
 from rhythmid.record.placeholder import Placeholder, without_placeholders
@@ -193,13 +194,14 @@ def _mat(path: Path) -> dict[str, Any]:
                 "ignore", MatReadWarning
             )  # it reads several objects as one unnamed variable
             found = loadmat(path, simplify_cells=True)
-        opaque = [value for value in found.values() if isinstance(value, MatlabOpaque)]
+            opaque = [value for value in found.values() if isinstance(value, MatlabOpaque)]
+            signals = signals_of(path, found) if opaque else {}
         objects = {_first(one["s0"]): _first(one["s2"]) for one in opaque}  # names and classes
         told = {
             name: value
             for name, value in found.items()
             if not name.startswith("__") and not isinstance(value, MatlabOpaque)
-        }
+        } | signals
         arrays = dict(_flat(told))
         if objects and not any(array.dtype.kind in NUMBERS for array in arrays.values()):
             raise ValueError(complaint_of_objects(objects))

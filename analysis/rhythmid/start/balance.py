@@ -15,6 +15,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
 from rhythmid.identify.inverse_dynamics.motion import Motion, high_pass, low_pass, motion_of, stretches
 from rhythmid.model import Model
+from rhythmid.record.back_and_forth import goes_back_and_forth
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
@@ -39,7 +40,6 @@ SLOW = 0.03
 MOST_ROWS = 4000  # largest number of rows: more would not improve a first guess
 # share of the driving signal that a multiple of the position leaves, below which it is a controller's position feedback
 FED_BACK = 1e-3
-THERE_AND_BACK = 2.0  # least path length, in units of the travel, of a machine that returns to its start
 LEAST_ROWS = 40  # least rows of a stretch for a guess
 
 
@@ -108,10 +108,9 @@ class Rows:
 
     @property
     def comes_back(self) -> bool:
-        """Whether the position moves back and forth: its path is at least twice its travel."""
+        """Whether the position goes back and forth."""
         place = COLUMNS.index("position")
-        path = sum(float(np.abs(np.diff(one[:, place])).sum()) for one in self.columns)
-        return path >= THERE_AND_BACK * self.span
+        return goes_back_and_forth([one[:, place] for one in self.columns])
 
     def delay(self, names: Sequence[str]) -> float:
         """Delay [s] of the driving signal that makes the balance of these columns clearly better; else 0.

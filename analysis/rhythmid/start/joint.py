@@ -15,12 +15,13 @@ CLOSE_MOTION = 0.7  # ratio to the largest motion of a joint above which the use
 
 @dataclass(frozen=True)
 class Joint:
-    """The selected joint (empty where there is only one), the motion of every joint (standard deviation), and the
-    names of `further` joints without a recorded motion."""
+    """The selected joint (empty where there is only one), the motion of every joint (standard deviation), the names of
+    `further` joints without a recorded motion, and whether it was `requested`."""
 
     name: str = ""
     motion: dict[str, float] = field(default_factory=dict)
     further: frozenset[str] = frozenset()
+    requested: bool = False
 
     @property
     def others(self) -> list[str]:
@@ -81,7 +82,7 @@ def joint_of(
             raise InputError(
                 f"{place}: no joint is called {wanted!r}; it has {', '.join(motion) or 'no named joints'}"
             )
-        return Joint(wanted, motion, _further(wanted, known, asked=True))
+        return Joint(wanted, motion, _further(wanted, known, asked=True), requested=True)
     ranked = sorted(motion, key=lambda name: -motion[name])
     if len(ranked) < 2:
         name = ranked[0] if ranked else ""

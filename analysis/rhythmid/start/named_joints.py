@@ -1,5 +1,6 @@
 """Columns of joints with a name that also means something else: `velocity_Rotation` is the velocity of the joint
-`rotation`, and `tau_SP` beside `tau_ELBOW` the torque of the joint `sp`, not a set point."""
+`rotation`, `tau_SP` beside `tau_ELBOW` the torque of the joint `sp`, not a set point, and `X_Current` beside `X_Position` and
+`Y_Current` that of the axis `x` of a machine tool (ISO 841)."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -24,6 +25,7 @@ NAMING: tuple[Quantity, ...] = (
 # least number of joint names beside a word, each with all of its quantities, that make the word a joint name: a
 # single one may be a sensor's
 PEERS = 2
+AXES = frozenset("x y z".split())  # axes of a machine tool, or directions of a vector
 
 
 def with_joints(found: Inventory) -> Inventory:
@@ -48,7 +50,7 @@ def _joints_among(headings: Iterable[str]) -> frozenset[str]:
     known = {tuple(words) for words in split}
     return frozenset(
         word for word in {one for words in known for one in words}
-        if _is_one_of_many(word, known)
+        if _is_one_of_many(word, known) or _is_axis(word, known)
         or (word in WORDS["position"] and (_beside_several(word, split) or _in_place_of_name(word, known)))
     )  # fmt: skip
 
@@ -58,12 +60,7 @@ def _is_one_of_many(word: str, known: set[tuple[str, ...]]) -> bool:
     q_KNEE, tau_KNEE, q_HIP and tau_HIP, without columns called only q or tau."""
     if not (is_word(word) or word in CONTROLLED_SHORT) or word in LETTERS:
         return False
-    frames = {
-        (words[:place], words[place + 1 :])
-        for words in known
-        for place, one in enumerate(words)
-        if one == word
-    }
+    frames = _frames(word, known)
     quantities = {quantity for begin, end in frames if (quantity := _quantity_of((*begin, *end))) is not None}
     if len(quantities) < 2 or any((*begin, *end) in known for begin, end in frames):
         return False
@@ -73,6 +70,28 @@ def _is_one_of_many(word: str, known: set[tuple[str, ...]]) -> bool:
     ]  # fmt: skip
     peers = set.intersection(*within)
     return sum(_is_name(one) and one not in PLACES for one in peers) >= PEERS
+
+
+def _is_axis(word: str, known: set[tuple[str, ...]]) -> bool:
+    """Whether a letter is an axis with a motion and an effort of its own, as a second letter is: X in X_Position and
+    X_Current beside Y_Position and Y_Current. The letters of a vector have one quantity."""
+    if word not in AXES:
+        return False
+    own = _frames(word, known)
+    if not set(NAMING) <= {quantity for frame in own for quantity in _said((*frame[0], *frame[1]), "")}:
+        return False
+    alone = any((*begin, *end) in known for begin, end in own)
+    return not alone and any(own <= _frames(other, known) for other in AXES - {word})
+
+
+def _frames(word: str, known: set[tuple[str, ...]]) -> set[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """The words before and after a word, in all names that contain it."""
+    return {
+        (words[:place], words[place + 1 :])
+        for words in known
+        for place, one in enumerate(words)
+        if one == word
+    }
 
 
 def _quantity_of(words: Iterable[str]) -> Quantity | None:

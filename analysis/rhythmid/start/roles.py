@@ -256,6 +256,8 @@ def _output(
             one for one in known
             if one.quantity == quantity and one.meaning.commanded is not True and not one.meaning.forcing and not one.meaning.base
         ]  # fmt: skip
+        if joint.requested:  # a motion of no joint, such as the motor's, only where it has none of its own
+            able = [one for one in able if one.meaning.joint == joint.name] or able
         if able:
             steered = (
                 gone_to_set_point(constant, joint, [one.one for one in able], quantity)

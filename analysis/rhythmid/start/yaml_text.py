@@ -102,8 +102,14 @@ def signals_yaml(
     if use:
         lines += ["", *comment("Only the part in which the machine moves freely (CHECK), s:"), use]
     else:
-        lines += ["", *comment("Only a part of the record:"), f"# {maybe or 'use: [0, 60]':<40}# s"]
+        lines += ["", *comment("Only a part of the record:"), f"# {maybe or _whole(roles):<40}# s"]
     return "\n".join(lines) + "\n"
+
+
+def _whole(roles: Roles) -> str:
+    """The line that uses the whole record, on the clock of its output."""
+    time = roles.choices["output"].recorded.time
+    return f"use: [{time[0]:.6g}, {time[-1]:.6g}]"
 
 
 def _time_doubt(clock: Clock) -> list[str]:

@@ -134,7 +134,7 @@ def search_effort(
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Search:
     """The state of a search; `found` holds all hypotheses fitted so far."""
 
@@ -231,11 +231,11 @@ class _Search:
         return found
 
     def _promising(self, shortlist: Sequence[Screened], parent: Fitted) -> list[Screened]:
-        """The additions that are worth a fit. A longer delay is if the alignment exceeds the uncertainty of the stamps."""
+        """The additions that are worth a fit. A longer delay is if the effort precedes the motion by more than the uncertainty of the stamps."""
         if self.promising is None:
             return list(shortlist)
         least = self.promising * parent.fit.correlation
-        late = abs(parent.fit.alignment) > Alignment.of(self.balance).std
+        late = parent.fit.alignment > Alignment.of(self.balance).std
         return [one for one in shortlist if (late if one.start.kind == "delay" else one.gain > least)]
 
     def _bases(self, parent: Fitted, start: Start) -> list[Fitted]:

@@ -26,7 +26,7 @@ from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, nam
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.link_cause import feels, likely_link
 from rhythmid.diagnose.joints.link_exchange import exchanged
-from rhythmid.diagnose.joints.misfit import braking, misfits
+from rhythmid.diagnose.joints.misfit import braking, late_efforts, misfits
 from rhythmid.diagnose.joints.stated_fit import stated_parameters
 from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
@@ -112,8 +112,8 @@ def diagnose_machine(
         raise InputError("no record is given; name at least one bag or table")
     check_held_out(records, holdout)
     known, spent = catalogue or load_catalogue(), Budget(budget)
-    records, said = cleaned_joints(records)
-    holdout, of_holdout = cleaned_joints(holdout)
+    records, said = cleaned_joints(records, machine.turning)
+    holdout, of_holdout = cleaned_joints(holdout, machine.turning)
     check_joints(machine, records)
     began = time.monotonic()
     balances = balances_of(machine, records)
@@ -146,6 +146,7 @@ def diagnose_machine(
         *put_right,
         *(one.words for one in best.gears.values()),
         *misfits(answers, braking(best.found, machine)),
+        *late_efforts(best.found),
     )
     diagnosis = compose_machine(
         machine,

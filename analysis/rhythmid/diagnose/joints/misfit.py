@@ -1,4 +1,4 @@
-"""Joints whose efforts the body's file hardly fits, whatever effects are named there."""
+"""Joints whose efforts the body's file hardly fits, whatever effects are named there, and efforts that come after the motion."""
 
 from collections.abc import Iterator, Mapping
 
@@ -39,6 +39,18 @@ def braking(found: Mapping[str, JointResult], machine: Machine) -> dict[str, str
         for joint, one in found.items()
     }
     return {joint: note for joint, note in told.items() if note is not None}
+
+
+def late_efforts(found: Mapping[str, JointResult]) -> Iterator[str]:
+    """One sentence where the efforts of most joints fit best after the motion, beyond the uncertainty of the stamps: no machine moves before it is driven."""
+    fits = {joint: one.result.chosen.fit for joint, one in found.items() if not one.by_reference}
+    late = [joint for joint, fit in fits.items() if fit.at_limit[0] and fit.alignment < 0.0]
+    if len(late) > max(0.5 * len(fits), 1):
+        by = min(-1e3 * fits[joint].alignment for joint in late)
+        yield (
+            f"the efforts of {', '.join(late)} fit best {by:.3g} ms or more after the motion, which no machine does: they were filtered or stamped "
+            "late, and that may be what is left there; record them without a filter, or the positions with the same one"
+        )
 
 
 def left_in_words(verdict: str, share: float, significant: bool, error: float | None) -> str:

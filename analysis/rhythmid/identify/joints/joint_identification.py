@@ -191,8 +191,8 @@ def identify_machine(
     if not records:
         raise InputError("no record is given; name at least one bag or table")
     check_held_out(records, holdout)
-    records, said = cleaned_joints(records)
-    holdout, of_holdout = cleaned_joints(holdout)
+    records, said = cleaned_joints(records, machine.turning)
+    holdout, of_holdout = cleaned_joints(holdout, machine.turning)
     seen, unseen = (records, holdout) if holdout else _split(records)
     check_joints(machine, seen)
     balances = balances_of(machine, seen)
