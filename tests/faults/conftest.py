@@ -43,6 +43,12 @@ def bag(tmp_path) -> Callable[..., Path]:
     return write
 
 
+@pytest.fixture(scope="session")
+def good_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The bag of `good_topics`, for tests that only need one to be there: they copy it."""
+    return write_bag(tmp_path_factory.mktemp("good") / "bag", good_topics())
+
+
 @pytest.fixture
 def bounded():
     """The test takes little time and memory; the process gets no more."""
