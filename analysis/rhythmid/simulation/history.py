@@ -66,8 +66,10 @@ def began(past, last, time, jumps):
 
 
 def with_room(past, oldest, last):
-    """The rows from `oldest` to `last`, with space for more."""
+    """The rows from `oldest` to `last`, with space for more; loops, for a slice takes seconds to compile."""
     kept = last + 1 - oldest
     roomy = np.zeros((max(2 * kept, 64), past.shape[1]))
-    roomy[:kept] = past[oldest : last + 1]
+    for row in range(kept):
+        for column in range(past.shape[1]):
+            roomy[row, column] = past[oldest + row, column]
     return roomy
