@@ -10,9 +10,8 @@ import yaml
 
 from rhythmid.errors import InputError
 
-LARGEST = (
-    4 << 20
-)  # characters of a document: a minute to read; the largest written by hand have some thousands
+# characters of a document: a minute to read; the largest written by hand have some thousands
+LARGEST = 4 << 20
 MOST_VALUES = 200_000  # values of a document, with those repeated by aliases: a few lines of aliases can expand to billions
 LONGEST_PATH = 1024  # characters; as long as YAML lets a plain key be
 

@@ -189,9 +189,8 @@ class Experiment:
             "count": self.count,
         }
         streams = [topic for topic in self.record.topics if topic not in ("run", "diagnostics")]
-        sinks = (
-            ["recorder"] if streams else []
-        )  # last consumer of the path, for which the credit of lockstep waits
+        # last consumer of the path, for which the credit of lockstep waits
+        sinks = ["recorder"] if streams else []
 
         def injector(name: str, source: str, target: str, delay: Delay) -> NodeSpec:
             return NodeSpec(

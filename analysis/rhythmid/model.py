@@ -120,6 +120,12 @@ class Model:
         return [name for name, value in self.parameters.items() if not value.fixed]
 
     @property
+    def held(self) -> list[str]:
+        """Names of the parameters that the file fixes, without those that are fixed by their nature."""
+        forms = {f"{term.label}.{p.name}" for term in self.terms for p in term.element.parameters if p.fixed}
+        return [name for name, value in self.parameters.items() if value.fixed and name not in forms]
+
+    @property
     def setting(self) -> Setting:
         """Properties that decide which effects the model could lack."""
         return Setting(

@@ -52,9 +52,8 @@ def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Iterable[in
     # What was inherited is not this process's to collect: going through it would copy the parent's memory, and may
     # meet frames of threads that exist in the parent only.
     gc.freeze()
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # an interruption is meant for the parent, which ends its workers
+    # an interruption is meant for the parent, which ends its workers
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     for index in own:
         try:
             answer = (index, function(items[index]), None)
@@ -86,6 +85,17 @@ def each(
         yield waiting.popleft().result()
 
 
+def _can_fork() -> bool:
+    """Whether this process may start workers: the system can fork, and this is not a worker itself."""
+    return "fork" in multiprocessing.get_all_start_methods() and not multiprocessing.current_process().daemon
+
+
+def _ready(running: Iterable[Any]) -> list[Any]:
+    """Wait until there is an answer; the pipes with one, in the order of their workers."""
+    ready = multiprocessing.connection.wait(list(running))
+    return [pipe for pipe in running if pipe in ready]
+
+
 def fork_map(
     function: Callable[[Item], Result], items: Sequence[Item], workers: int | None = None
 ) -> Iterator[tuple[int, Result | Exception]]:
@@ -95,8 +105,7 @@ def fork_map(
     if the same item kills that one, too.
     """
     count = min(workers or cores(), len(items))
-    within = multiprocessing.current_process().daemon  # a worker, which may not start its own workers
-    if count <= 1 or within or "fork" not in multiprocessing.get_all_start_methods():
+    if count <= 1 or not _can_fork():
         for index, item in enumerate(items):
             try:
                 yield index, function(item)
@@ -120,8 +129,7 @@ def fork_map(
         for worker in range(count):
             start(list(range(worker, len(items), count)))
         while running:
-            ready = multiprocessing.connection.wait(list(running))
-            for pipe in [one for one in running if one in ready]:
+            for pipe in _ready(running):
                 process, left = running[pipe]
                 try:
                     index, result, error = pipe.recv()
@@ -153,14 +161,13 @@ def fork_each(
     A free process takes the next item. A process ends after `lifetime` items, which frees its memory. An item whose
     process is killed is tried once more. If that process is killed, too, the result is a RuntimeError that names the signal.
     """
-    if multiprocessing.current_process().daemon or "fork" not in multiprocessing.get_all_start_methods():
+    if not _can_fork():
         yield from fork_map(function, items, 1)
         return
     context = multiprocessing.get_context("fork")
     waiting, tried = deque(range(len(items))), set[int]()
-    running: dict[
-        Any, tuple[Any, int, int]
-    ] = {}  # its process, the item at hand, items that it may still take
+    # by pipe: its process, the item at hand, items that it may still take
+    running: dict[Any, tuple[Any, int, int]] = {}
 
     def start() -> None:
         ours, theirs = context.Pipe()
@@ -186,8 +193,7 @@ def fork_each(
         while waiting or running:
             while waiting and len(running) < (workers or cores()):
                 start()
-            ready = multiprocessing.connection.wait(list(running))
-            for pipe in [one for one in running if one in ready]:
+            for pipe in _ready(running):
                 process, index, left = running.pop(pipe)
                 try:
                     _, result, error = pipe.recv()

@@ -8,7 +8,7 @@ from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import compile_model
 from rhythmid.simulation.effect import Path, effect_along
-from rhythmid.simulation.generated_source import Variant
+from rhythmid.simulation.right_hand_side import Variant
 from rhythmid.simulation.signal import pieces, zero_order_hold
 from rhythmid.simulation.simulate import simulate
 

@@ -18,7 +18,8 @@ from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.effect import Path as Trajectory
 from rhythmid.simulation.effect import effect_along
-from rhythmid.simulation.generated_source import Variant, generate
+from rhythmid.simulation.generated_source import generate
+from rhythmid.simulation.right_hand_side import Variant
 from rhythmid.simulation.signal import zero_order_hold
 from rhythmid.simulation.simulate import simulate
 

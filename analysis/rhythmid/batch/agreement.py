@@ -14,12 +14,8 @@ from rhythmid.batch.task import Task
 from rhythmid.report.quantity import pretty_name
 
 LEVEL = 0.05  # probability that any parameter of a batch is reported to differ although there is only the stated noise
-UNITS = (
-    (86400.0, "day"),
-    (3600.0, "h"),
-    (60.0, "min"),
-    (1.0, "s"),
-)  # of time, the longest that the runs span twice
+# of time, the longest that the runs span twice
+UNITS = ((86400.0, "day"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
 Verdict = Literal["agrees", "differs", "too few runs"]
 RUN = "run"  # unit of time if no clock gives it: the number of the run
 

@@ -31,9 +31,8 @@ from rhythmid.record.signals import Signals
 from rhythmid.record.time_origin import CALENDAR
 from rhythmid.report.page import Page, render
 
-KIBIBYTE = (
-    1 if sys.platform == "darwin" else 1024
-)  # bytes per unit in which the system reports the largest memory of a process
+# bytes per unit in which the system reports the largest memory of a process
+KIBIBYTE = 1 if sys.platform == "darwin" else 1024
 LONGEST_REASON = 300  # characters of a reason
 
 

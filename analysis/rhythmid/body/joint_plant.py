@@ -176,9 +176,8 @@ class JointPlant:
         rows = self._rows[:-1] if self._done or len(self._rows) else self._rows
         self._rows, self._done = np.vstack([rows, out]), last
         if len(self._knots):
-            gone = (
-                int(np.sum(self._knots.max(axis=1) <= edges[-2])) - 1
-            )  # another command already acts at all joints
+            # another command already acts at all joints
+            gone = int(np.sum(self._knots.max(axis=1) <= edges[-2])) - 1
             if gone > 0:
                 self._knots, self._levels = self._knots[gone:], self._levels[gone:]
 

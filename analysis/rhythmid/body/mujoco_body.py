@@ -47,15 +47,13 @@ class MujocoBody(Body):
     contacts: bool = True
     passive: Mapping[str, Passive] = field(default_factory=dict)
     given: Mapping[str, float] = field(default_factory=dict)
-    ends: Mapping[str, Array] = field(
-        default_factory=dict
-    )  # for links that may carry a payload, its position (3,) in their frames
+    # for links that may carry a payload, its position (3,) in their frames
+    ends: Mapping[str, Array] = field(default_factory=dict)
     centres: Mapping[str, Array] = field(default_factory=dict)  # (3,) of links, where they are not the file's
     notes: tuple[str, ...] = ()  # parts of the file that were left out or changed, in words
     hold: Mapping[str, float] = field(default_factory=dict)  # positions of the file's joints that are fixed
-    replaced: Mapping[str, Array] = field(
-        default_factory=dict
-    )  # for links whose inertia is not the file's, the ten numbers (10,) without a payload
+    # for links whose inertia is not the file's, the ten numbers (10,) without a payload
+    replaced: Mapping[str, Array] = field(default_factory=dict)
     mounted: bool = False  # whether gravity differs from the file's
     _alone: Remembered = field(default_factory=Remembered, repr=False)  # forces of single links
 

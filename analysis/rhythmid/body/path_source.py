@@ -15,6 +15,7 @@ from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.simulation.kernel_source import kernel_module
 from rhythmid.simulation.machine_code import Module
+from rhythmid.simulation.right_hand_side import along_command
 
 REST = 1e-9  # [rad/s or m/s] speed for the secant at lower speeds
 TRANSPORT = ("input_delay", "measurement_delay")  # delays that a live run can include
@@ -125,14 +126,7 @@ def _joint(writer: Writer, number: int, joint: str, model: Model) -> None:
     lines += [f"x = qpos[at_position[{number}]]", f"v = qvel[at_velocity[{number}]]"]
     lines.append(f"f = command[row, {number}]")
     writer.transport(model, "command", "f")
-    seen = ["x", "v"]
-    command = [term for term in kernels if term.element.slot == "command"]
-    for term in (one for one in command if one.element.acts == "observation"):
-        writer.call(term, [*seen, "t"], "seen, speed")
-        seen = ["seen", "speed"]
-    command = [one for one in command if one.element.acts != "observation"]
-    for term in sorted(command, key=lambda one: one.element.acts == "feedback"):
-        writer.call(term, ["f", *seen, "t"] if term.element.acts == "feedback" else ["f", "t"], "f")
+    along_command(kernels, ["x", "v"], writer.call)
     if not writer.live:
         lines.append(f"f = f + forcing[row, {number}]")
     force = [term for term in kernels if term.element.slot == "force"]

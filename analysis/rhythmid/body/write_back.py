@@ -36,13 +36,8 @@ ROUNDING = 1e-12  # relative rounding error of a link's inertia
 # [m] radius of gyration of a payload in a URDF, in which an inertia cannot be zero
 LEAST_GYRATION_RADIUS = 1e-3
 LOSSES = ("viscous_damper", "coulomb_friction", "soft_constraint_friction")
-KEPT = (
-    "name",
-    "class",
-    "group",
-    "forcerange",
-    "forcelimited",
-)  # of an actuator; further attributes of its class are overridden
+# of an actuator; further attributes of its class are overridden
+KEPT = ("name", "class", "group", "forcerange", "forcelimited")
 PLAIN = {"ctrllimited": "false", "dyntype": "none", "gaintype": "fixed", "biastype": "none", "gear": "1"}
 WRITTEN = {"ipos": "pos", "iquat": "quat", "inertia": "diaginertia"}  # of an inertial element
 IN_PLACE = frozenset(

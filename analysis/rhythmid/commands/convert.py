@@ -71,25 +71,20 @@ def convert(
             lines = guessed.lines()
         for line in lines:
             terminal.say(line)
+    of: dict[str, Any]
     if isinstance(record, JointRecord):
         write_joint_record(record, out)
         roles = dict.fromkeys(role for one in record.joints.values() for role in one.channels)
-        samples = {
-            f"{name}.{role}": len(one)
-            for name, part in record.every.items()
-            for role, one in part.channels.items()
-        }
+        parts = record.every.items()
+        samples = {f"{name}.{role}": len(one) for name, part in parts for role, one in part.channels.items()}
         what = f"{len(record.joints)} joints ({', '.join(record.joints)}): {', '.join(roles)}"
+        of = {"joints": list(record.joints)}
     else:
-        write_record(record, out, joint or "joint")
+        of = {"joint": joint or "joint"}
+        write_record(record, out, of["joint"])
         samples = {role: len(channel) for role, channel in record.channels.items()}
         what = ", ".join(samples)
     terminal.say(f"{out}: {what}; read it with --signals {out / 'signals.yaml'}")
     if json is not None:
         files = {"path": str(out), "signals": str(out / "signals.yaml")}
-        of = (
-            {"joints": list(record.joints)}
-            if isinstance(record, JointRecord)
-            else {"joint": joint or "joint"}
-        )
         write_json(json, {**files, **of, "samples": samples, "guessed": told})

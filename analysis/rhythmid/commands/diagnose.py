@@ -80,32 +80,16 @@ def diagnose(
     from rhythmid.record.read import load_records
 
     require_new(json, report, save_model)
-    if budget is not None and not (math.isfinite(budget) and budget > 0.0):
-        raise InputError("--budget is a number of seconds greater than 0")
-    if model is None and sim is None:
-        raise InputError("nothing to compare the records with: give --model NOMINAL.yaml, --sim BAG, or both")
-    if model is None and (holdout or save_model or budget):
-        raise InputError(
-            "--holdout, --budget and --save-model belong to a model: give --model NOMINAL.yaml too"
-        )
+    _check(model, sim, budget, bool(holdout or save_model or budget))
+    terminal = Terminal(quiet, json)
     if model is not None and machines.is_machine(model):
         machines.refuse(sim=sim)
         machines.diagnose_files(
-            bags,
-            model,
-            signals,
-            holdout or (),
-            elements or (),
-            json,
-            report,
-            save_model,
-            budget,
-            Terminal(quiet, json),
+            bags, model, signals, holdout or (), elements or (), json, report, save_model, budget, terminal
         )
         return
     catalogue = load_catalogue(elements or ())
     nominal = None if model is None else Model.load(model, catalogue)
-    terminal = Terminal(quiet, json)
     with progress(terminal.progress) as tell:
         records = load_records(bags, signals, tell)
         unseen = load_records(holdout or (), signals, tell)
@@ -131,7 +115,6 @@ def diagnose(
         answer.model.save(save_model)
     if report is not None:
         from rhythmid.diagnose.answer.present import present, present_comparison
-        from rhythmid.report.page import write_page
 
         with progress(terminal.progress) as tell:
             tell("drawing the report")
@@ -140,8 +123,19 @@ def diagnose(
             else:
                 assert comparison is not None and simulation is not None
                 page = present_comparison(comparison, simulation, records, command_line())
-            write_page(report, page)
-        terminal.say(f"report: {report}")
+        terminal.report(report, page)
+
+
+def _check(model: Path | None, sim: Path | None, budget: float | None, of_a_model: bool) -> None:
+    """Raise InputError for options that do not go together; `of_a_model`: whether some are given that need a model."""
+    if budget is not None and not (math.isfinite(budget) and budget > 0.0):
+        raise InputError("--budget is a number of seconds greater than 0")
+    if model is None and sim is None:
+        raise InputError("nothing to compare the records with: give --model NOMINAL.yaml, --sim BAG, or both")
+    if model is None and of_a_model:
+        raise InputError(
+            "--holdout, --budget and --save-model belong to a model: give --model NOMINAL.yaml too"
+        )
 
 
 def _simulation(path: Path, signals: Path | None, own: Path | None) -> "Record":

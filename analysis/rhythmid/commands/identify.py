@@ -17,6 +17,7 @@ from rhythmid.commands.options import (
     command_line,
 )
 from rhythmid.commands.terminal import Terminal
+from rhythmid.errors import InputError
 from rhythmid.output import require_new, write_json
 
 EXAMPLES = (
@@ -79,7 +80,6 @@ def identify(
 ) -> None:
     """Find a model's parameters, the command and measurement delays, and the harmonic transfer functions."""
     from rhythmid.elements.catalogue import load_catalogue
-    from rhythmid.errors import InputError
     from rhythmid.identify.identifiability import Forcing, offset_of
     from rhythmid.identify.identify import Method
     from rhythmid.identify.identify import identify as find
@@ -90,51 +90,34 @@ def identify(
     from rhythmid.record.read import load_records
 
     require_new(json, report, save_model, save)
+    terminal = Terminal(quiet, json)
     if model is not None and machines.is_machine(model):
         machines.refuse(
             save=save, forcing=forcing, clock_offset=clock_offset, clock_offset_std=clock_offset_std,
             method=method, htf=htf,
         )  # fmt: skip
         machines.identify_files(
-            bags,
-            model,
-            signals,
-            holdout or (),
-            elements or (),
-            json,
-            report,
-            save_model,
-            Terminal(quiet, json),
+            bags, model, signals, holdout or (), elements or (), json, report, save_model, terminal
         )
         return
     method, htf = method or "joint", htf or "auto"
-    if method not in get_args(Method):
-        raise InputError(f"--method {method}: one of {', '.join(get_args(Method))} is expected")
-    if htf not in get_args(HtfMethod):
-        raise InputError(f"--htf {htf}: one of {', '.join(get_args(HtfMethod))} is expected")
-    if forcing is not None and forcing not in get_args(Forcing):
-        raise InputError(f"--forcing {forcing}: one of {', '.join(get_args(Forcing))} is expected")
+    _check("method", method, get_args(Method))
+    _check("htf", htf, get_args(HtfMethod))
+    _check("forcing", forcing, get_args(Forcing))
     offset = offset_of(clock_offset, clock_offset_std)
     if offset is not None and forcing not in (None, "clock_unknown"):
         raise InputError(
             f"--clock-offset says that the forcing's clock is unknown, --forcing {forcing} that it is known"
         )
     known = None if model is None else Model.load(model, load_catalogue(elements or ()))
-    terminal = Terminal(quiet, json)
     with progress(terminal.progress) as tell:
         records = load_records(bags, signals, tell)
         unseen = load_records(holdout or (), signals, tell)
         path = "clock_unknown" if offset is not None else cast(Forcing | None, forcing)
         found = find(
-            records,
-            known,
-            method=cast(Method, method),
-            forcing=path,
-            offset=offset,
-            htf=cast(HtfMethod, htf),
-            tell=tell,
-            holdout=unseen,
-        )
+            records, known, method=cast(Method, method), forcing=path, offset=offset, htf=cast(HtfMethod, htf),
+            tell=tell, holdout=unseen,
+        )  # fmt: skip
     found.show(terminal.answer)
     if json is not None:
         write_json(json, found.to_dict())
@@ -146,9 +129,11 @@ def identify(
         terminal.say(f"{save}: not written, for no controller should use this fit")
     if report is not None:
         from rhythmid.identify.present import present
-        from rhythmid.report.page import write_page
 
-        write_page(
-            report, present(found, command_line(), "the paper's hopper" if model is None else model.name)
-        )
-        terminal.say(f"report: {report}")
+        name = "the paper's hopper" if model is None else model.name
+        terminal.report(report, present(found, command_line(), name))
+
+
+def _check(option: str, given: str | None, known: tuple[str, ...]) -> None:
+    if given is not None and given not in known:
+        raise InputError(f"--{option} {given}: one of {', '.join(known)} is expected")

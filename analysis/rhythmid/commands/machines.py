@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rhythmid.commands.options import command_line
 from rhythmid.errors import InputError
 from rhythmid.output import write_json
 
@@ -53,6 +54,10 @@ def _held_out(holdout: Sequence[Path], bags: Sequence[Path], signals: Path | Non
     return load_joint_records(holdout, _signals(bags, signals)) if holdout else []
 
 
+def _source(model: Path, bags: Sequence[Path]) -> str:
+    return f"{model.name} with {', '.join(bag.name for bag in bags)}"
+
+
 def refuse(**given: object) -> None:
     """Raise InputError for options that have no meaning for several joints."""
     for name, value in given.items():
@@ -86,13 +91,10 @@ def diagnose_files(
     if json is not None:
         write_json(json, answer.diagnosis.to_dict())
     if report is not None:
-        from rhythmid.commands.options import command_line
         from rhythmid.diagnose.joints.joint_present import present_machine
-        from rhythmid.report.page import write_page
 
-        source = f"{model.name} with {', '.join(bag.name for bag in bags)}"
-        write_page(report, present_machine(answer, machine, source, command_line()))
-        terminal.say(f"report: {report}")
+        page = present_machine(answer, machine, _source(model, bags), command_line())
+        terminal.report(report, page)
     saved(answer.machine, save_model, terminal)
 
 
@@ -146,13 +148,10 @@ def identify_files(
     if json is not None:
         write_json(json, found.to_dict())
     if report is not None:
-        from rhythmid.commands.options import command_line
         from rhythmid.identify.joints.joint_present import present_identified
-        from rhythmid.report.page import write_page
 
-        source = f"{model.name} with {', '.join(bag.name for bag in bags)}"
-        write_page(report, present_identified(found, machine, source, command_line()))
-        terminal.say(f"report: {report}")
+        page = present_identified(found, machine, _source(model, bags), command_line())
+        terminal.report(report, page)
     saved(found.machine, save_model, terminal)
 
 

@@ -12,6 +12,9 @@ from rhythmid.errors import InputError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from rhythmid.proof.campaign import Sealed
+    from rhythmid.proof.score import Score
+
 Kinds = Literal["single", "pairs", "null", "left-out", "all"]
 Machines = Literal["hopper", "axis", "joint", "pendulum", "shaken", "servo", "decay", "motor", "all"]
 
@@ -51,14 +54,7 @@ def proof(
     quiet: Quiet = False,
 ) -> None:
     """Draw random machines with concealed effects, seal the truth, diagnose their records, open the seals and score the answers."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich import progress
 
     from rhythmid.proof.campaign import Campaign, Sealed, Task, begin, carry_out, scores_in, write_card
     from rhythmid.report.terminal_table import print_markdown
@@ -78,28 +74,17 @@ def proof(
     campaign = Campaign(seed, kind, cases, machine, cluttered, budget)
     tasks = chosen(campaign)
     begin(out, campaign, resume)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=terminal.progress) as progress:
-        bar = progress.add_task("cases", total=len(tasks), completed=len(scores_in(out, tasks)))
+    columns = [
+        progress.TextColumn("{task.description}"), progress.BarColumn(), progress.MofNCompleteColumn(),
+        progress.TimeElapsedColumn(), progress.TimeRemainingColumn(),
+    ]  # fmt: skip
+    with progress.Progress(*columns, console=terminal.progress) as shown:
+        bar = shown.add_task("cases", total=len(tasks), completed=len(scores_in(out, tasks)))
 
-        def report(news) -> None:
-            if isinstance(news, Sealed):
-                progress.console.print(f"{news.case}  sealed  {news.sha256}", highlight=False, soft_wrap=True)
-                return
-            progress.advance(bar)
-            answer = " + ".join(news.named) or news.verdict
-            progress.console.print(
-                f"{news.case}  {news.outcome:10s}  {' + '.join(news.true) or 'nothing'}  →  {answer}"
-                f"  ({news.faintest:.2f} σ, {news.seconds:.0f} s)",
-                highlight=False,
-                soft_wrap=True,
-            )
+        def report(news: "Sealed | Score") -> None:
+            if not isinstance(news, Sealed):
+                shown.advance(bar)
+            shown.console.print(_line(news), highlight=False, soft_wrap=True)
 
         failures = carry_out(out, tasks, jobs, report, keep)
     write_card(out, campaign)
@@ -109,6 +94,19 @@ def proof(
     console.print(f"{out / 'proof.md'}, {out / 'proof.json'}")
     if failures:
         raise typer.Exit(1)
+
+
+def _line(news: "Sealed | Score") -> str:
+    """What is told of a case when it is sealed, and when it is scored."""
+    from rhythmid.proof.campaign import Sealed
+
+    if isinstance(news, Sealed):
+        return f"{news.case}  sealed  {news.sha256}"
+    answer = " + ".join(news.named) or news.verdict
+    return (
+        f"{news.case}  {news.outcome:10s}  {' + '.join(news.true) or 'nothing'}  →  {answer}"
+        f"  ({news.faintest:.2f} σ, {news.seconds:.0f} s)"
+    )
 
 
 def _replay(out: Path, console: "Console", chosen) -> None:

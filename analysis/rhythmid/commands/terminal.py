@@ -9,6 +9,8 @@ from rhythmid.output import STANDARD_OUTPUT
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from rhythmid.report.page import Page
+
 WHOLE = 100_000  # columns if their number is unknown, as in a file: longer than any line
 
 
@@ -27,6 +29,13 @@ class Terminal:
     def say(self, line: str) -> None:
         """Print one line of the answer as it is; a long one is not broken."""
         self.answer.print(line, markup=False, highlight=False, soft_wrap=True)
+
+    def report(self, path: Path, page: "Page") -> None:
+        """Write a report, and say where it is."""
+        from rhythmid.report.page import write_page
+
+        write_page(path, page)
+        self.say(f"report: {path}")
 
 
 def console(quiet: bool = False, stderr: bool = False) -> "Console":

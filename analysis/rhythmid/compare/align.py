@@ -23,9 +23,8 @@ Array = NDArray[np.float64]
 Clock = Literal["command", "forcing", "output"]
 MOST_SAMPLES = 200_000  # largest number of samples of a common grid
 OVERLAP = 0.3  # share of the shorter record that must be common to both
-CLOSE_CORRELATION = (
-    0.03  # difference of the correlation within which other offsets of a periodic command are tried as well
-)
+# difference of the correlation within which other offsets of a periodic command are tried as well
+CLOSE_CORRELATION = 0.03
 TRIED = 12  # offsets of a periodic command that are tried
 SAME = 0.05  # relative rms difference up to which two commands count as equal
 TURN = 0.01  # phase difference [cycles] up to which the forcings count as in phase

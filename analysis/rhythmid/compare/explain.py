@@ -20,9 +20,8 @@ from rhythmid.compare.pair import Pair
 Array = NDArray[np.float64]
 FOLDS, DEALT = 5, 20  # folds of a cross-validation, stretches in each
 LEAST_SHARE = 0.02  # share of the remainder that an explanation must remove
-LEAST_OF_WHOLE = (
-    0.004  # share of the whole difference that it must remove where the oscillator limits the accuracy
-)
+# share of the whole difference that it must remove where the oscillator limits the accuracy
+LEAST_OF_WHOLE = 0.004
 LEAST_OF_WHOLE_CHANNEL = 0.001  # the same among channel corrections, which are applied exactly
 LEAST_OF_WHOLE_ROUGH = 0.05  # the same where limit cycle and response had to be shifted separately
 SIMPLER = 0.03  # share by which a simpler explanation may be worse

@@ -67,13 +67,8 @@ def harmonic_columns(time: Array, frequency: float, count: int) -> Array:
 def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tuple[Pair, list[str]]:
     """Both motions at common times, and notes. Raises InputError when they have too little in common."""
     offset = alignment.offset
-    for one in (simulation, recording):
-        if len(one.output) < FEWEST_SAMPLES:
-            raise InputError(
-                f"{one.name}: has only {len(one.output)} samples of the output; {FEWEST_SAMPLES} are needed to compare"
-            )
-        if np.ptp(one.output.value) == 0.0:
-            raise InputError(f"{one.name}: the output never changes; there is nothing to compare")
+    _check(simulation)
+    _check(recording)
     rate = min(1.0 / simulation.output.period, 1.0 / recording.output.period)
     grid = recording.uniform(rate)
     inside = (grid.time >= simulation.output.time[0] + offset) & (
@@ -105,9 +100,8 @@ def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tupl
     effort = np.sum(efforts, axis=0) if efforts else None
     highest = min(bandwidth(value, grid.period), 0.5 / step)
     pumped = active_pumping(recording)
-    noise = math.hypot(white_level(recording.output.value), white_level(simulation.output.value)) / math.sqrt(
-        block
-    )
+    levels = (white_level(one.output.value) for one in (recording, simulation))
+    noise = math.hypot(*levels) / math.sqrt(block)
     oscillator = None if effort is None else oscillator_of(effort, simulated, step, frequency, highest)
     if oscillator is None:
         oscillator = _free(
@@ -122,6 +116,16 @@ def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tupl
     if pumped is None or command is None or not active(recording.input):
         return pair, []
     return _with_cycle(pair, pumped.frequency, alignment.turn)
+
+
+def _check(one: Record) -> None:
+    """Raise InputError for a record with too little to compare."""
+    if len(one.output) < FEWEST_SAMPLES:
+        raise InputError(
+            f"{one.name}: has only {len(one.output)} samples of the output; {FEWEST_SAMPLES} are needed to compare"
+        )
+    if np.ptp(one.output.value) == 0.0:
+        raise InputError(f"{one.name}: the output never changes; there is nothing to compare")
 
 
 def _dominant(motion: Array, step: float) -> float:

@@ -38,14 +38,12 @@ def chirp_comb(requirements: Requirements, ring_down: float) -> SignalPlan:
     repeat = periods * pumping / count
     sweep = whole * pumping
     low, high = requirements.band
-    cycles = max(
-        1, math.floor(0.5 * (low + high) * sweep + 1e-9)
-    )  # whole chirps: each ends at zero, without a jump
+    # whole chirps: each ends at zero, without a jump
+    cycles = max(1, math.floor(0.5 * (low + high) * sweep + 1e-9))
     high = max(2.0 * cycles / sweep - low, low + 1.0 / sweep)
     teeth = count * np.arange(max(1, math.ceil(low * repeat - 1e-9)), math.floor(high * repeat + 1e-9) + 1)
-    teeth = teeth[
-        teeth % periods != 0
-    ]  # a line at a harmonic of the cycle carries no information and is not used
+    # a line at a harmonic of the cycle carries no information and is not used
+    teeth = teeth[teeth % periods != 0]
     response = ResponseLines(
         teeth.astype(np.int64), periods, 1.0 / (periods * pumping), requirements.harmonics
     )

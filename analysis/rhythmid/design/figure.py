@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 from rhythmid.design.designer import Design
 
 Array = NDArray[np.float64]
-SHOWN_PERIODS = (
-    4  # periods of the forcing, or of the middle of the band without forcing, over which the motion is drawn
-)
-CYCLES = (
-    60  # periods of the highest frequency over which the command is drawn; more could not be distinguished
-)
+# periods of the forcing, or of the middle of the band without forcing, over which the motion is drawn
+SHOWN_PERIODS = 4
+# periods of the highest frequency over which the command is drawn; more could not be distinguished
+CYCLES = 60
 COLOURS = {0: "black", 1: "tab:blue", 2: "tab:green", 3: "tab:orange", 4: "tab:red"}
 DEEPEST = 1e-2  # share of the noise floor below which nothing is drawn
 

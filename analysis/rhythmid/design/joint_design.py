@@ -32,9 +32,8 @@ from rhythmid.record.joint_record import JointRecord
 
 Array = NDArray[np.float64]
 PERIODS_IN_A_RUN = 2  # repetitions of the multisines in a run, whose differences show the noise
-MARGIN = (
-    0.1  # share of a joint's travel at either end that references leave free for the controllers' overshoot
-)
+# share of a joint's travel at either end that references leave free for the controllers' overshoot
+MARGIN = 0.1
 DRAWS = 20  # draws of the phases, of which the best is taken
 POSES = 200  # poses of a period at which draws are compared
 SMALLER = 0.8  # factor of each reduction of the references

@@ -60,9 +60,8 @@ class ResponseLines:
                 f"the design aliases: the line at {self.frequency[hidden[0]]:.6g} Hz lies on a harmonic of the forcing, where "
                 f"the limit cycle hides its response; {remedy}"
             )
-        for nearest in range(
-            1, self.harmonics + 1
-        ):  # with few harmonics between them the example is the clearest
+        # with few harmonics between them the example is the clearest
+        for nearest in range(1, self.harmonics + 1):
             rows = np.flatnonzero(np.abs(self.orders) <= nearest)
             order = np.argsort(bins[rows], axis=None, kind="stable")
             same = np.flatnonzero(np.diff(bins[rows].ravel()[order]) == 0)

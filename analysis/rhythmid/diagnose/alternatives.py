@@ -26,17 +26,14 @@ from rhythmid.elements.element import Element, Scales, Slot
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series, dominant_frequency
-from rhythmid.model import INERTIA, Model, Term
+from rhythmid.model import Model, Term
 from rhythmid.progress import Tell, silent
-from rhythmid.simulation.generated_source import DRIVES
+from rhythmid.simulation.right_hand_side import DRIVES
 from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
-SIGNALS: tuple[Slot, ...] = (
-    "command",
-    "actuator",
-    "sensor",
-)  # slots for a law whose only parameters are times
+# slots for a law whose only parameters are times
+SIGNALS: tuple[Slot, ...] = ("command", "actuator", "sensor")
 CLOCKS: tuple[Slot, ...] = ("command", "timing")  # slots for a delay that may drift
 LONGER = (2.0, 5.0, 12.0, 30.0)  # [samples] first guesses of a longer delay
 
@@ -164,11 +161,7 @@ def _freed(base: Trial) -> Iterator[Proposal]:
 
 def fixed_values(model: Model, effects: Sequence[str] = ()) -> list[str]:
     """Nonzero parameters that the author of the nominal model has fixed, and that are not fixed by their nature."""
-    names = [INERTIA] if model.mass.fixed else []
-    for term in model.terms:
-        for key, value in term.values.items():
-            if value.fixed and value.value != 0.0 and not term.element.parameter(key).fixed:
-                names.append(f"{term.label}.{key}")
+    names = (name for name in model.held if model.value(name) != 0.0)
     return [name for name in names if name.rpartition(".")[0] not in effects]
 
 

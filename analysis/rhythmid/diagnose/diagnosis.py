@@ -5,14 +5,14 @@ the nominal model lacks, weigh the hypotheses on data that no fit has seen, and 
 """
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
 from threadpoolctl import threadpool_limits
 
-from rhythmid import parallel
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.admission import Admitted, admitted
 from rhythmid.diagnose.agreement import HOW, contradictions, tells_all
@@ -38,8 +38,9 @@ from rhythmid.identify.inverse_dynamics.applicability import Applicability, appl
 from rhythmid.identify.joint_covariance import JointCovariance
 from rhythmid.identify.plausibility import BACK, check_plausible, shift
 from rhythmid.identify.record_zero import without_record_zero
-from rhythmid.identify.series import prepare
+from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
+from rhythmid.parallel import cores
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 from rhythmid.record.same_recording import check_held_out
@@ -218,7 +219,7 @@ def diagnose(
     check_free(model)
     given = admitted(records, holdout, model)
     # the matrices are tall and thin and workers run in parallel: threads inside linear algebra would only slow them down
-    with threadpool_limits(1), ThreadPoolExecutor(parallel.cores()) as pool:
+    with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         known = catalogue or load_catalogue()
         case = Case(model, given.records, given.holdout, known, pool, tell, Budget(budget))
         whole = replace(case, records=given.whole_records, holdout=given.whole_holdout)
@@ -310,24 +311,8 @@ def _answers(
         yield answer
         if tells_all(answer.diagnosis, quasi_static) or late(BY_MOTION):
             return
-    series, count = prepare((*case.records, *case.holdout)), len(case.records)
-
-    def by_motion(windows: bool) -> Iterator[Answer]:
-        ways = settle(
-            case.nominal, series[:count], series[count:], case.catalogue, case.pool, case.tell, windows
-        )
-        for number in itertools.count():
-            with deadline(case.budget.at(SEARCHED, LEAST_CALIBRATION)):
-                scoring = next(ways, None)
-            if scoring is None or (number and late(f"scoring {HOW[scoring.kind]}")):
-                return
-            result = free_run(case, scoring)
-            diagnosis = compose(case, result, given.notes)
-            model = without_record_zero(without_free_maps(result.search.fit.model))
-            kept = admissible(model, case.nominal, result.search.fit.std)
-            told = [note for name, note in kept.moved.items() if name in case.nominal.parameters]
-            yield Answer(replace(diagnosis, notes=(*diagnosis.notes, *told)), kept.model, result)
-
+    series = prepare((*case.records, *case.holdout))
+    by_motion = partial(_by_motion, case, series, given.notes, late)
     if first or not effort.applies:
         yield from by_motion(windows=True)
         return
@@ -351,6 +336,25 @@ def _answers(
         untried.append(Untried(BY_MOTION, str(error)))
     if failed or not (driven or late(BY_EFFORT)):
         yield _by_effort(whole, effort, effort_notes)
+
+
+def _by_motion(
+    case: Case, series: Sequence[Series], notes: Sequence[str], late: Callable[[str], bool], windows: bool
+) -> Iterator[Answer]:
+    """Answers of free run and, with `windows`, of windows too; `late` says whether a further mode is left out."""
+    count = len(case.records)
+    ways = settle(case.nominal, series[:count], series[count:], case.catalogue, case.pool, case.tell, windows)
+    for number in itertools.count():
+        with deadline(case.budget.at(SEARCHED, LEAST_CALIBRATION)):
+            scoring = next(ways, None)
+        if scoring is None or (number and late(f"scoring {HOW[scoring.kind]}")):
+            return
+        result = free_run(case, scoring)
+        diagnosis = compose(case, result, notes)
+        model = without_record_zero(without_free_maps(result.search.fit.model))
+        kept = admissible(model, case.nominal, result.search.fit.std)
+        told = [note for name, note in kept.moved.items() if name in case.nominal.parameters]
+        yield Answer(replace(diagnosis, notes=(*diagnosis.notes, *told)), kept.model, result)
 
 
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST_EFFECTS) -> Answer:
@@ -379,8 +383,6 @@ def _compared(answer: Answer, made: Sequence[Answer]) -> Answer:
 
 def _with_untried(answer: Answer, untried: Sequence[Untried]) -> Answer:
     """The answer, extended by the scoring modes that were not tried for lack of time or because of the records."""
-    if not untried:
-        return answer
     found = answer.diagnosis
     return replace(answer, diagnosis=replace(found, excluded=(*found.excluded, *untried)))
 

@@ -170,9 +170,8 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
             normal, right = _normal_equations(jacobian, weight, residual)
             normal = normal / np.outer(norms, norms) + precision
             step = np.linalg.lstsq(normal, right / norms + pull, rcond=1e-12)[0] / norms
-            change = (
-                jacobian @ -step
-            )  # avoids a negated copy of the jacobian, which is large for long records
+            # avoids a negated copy of the jacobian, which is large for long records
+            change = jacobian @ -step
             spread = max(scale_of((residual + change)[seen]), blocks.least)
         error[out] += change[out]
         scale[blocks.fold == fold] = spread

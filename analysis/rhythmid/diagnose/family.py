@@ -59,9 +59,8 @@ def families_of(
         def chance(rest: float, family: str = family, share: float = share, vague: float = vague) -> float:
             return chance_of_law(share, rest, vague, family)
 
-        own = [
-            name for name in chosen.names if chosen.family.get(name) == family
-        ]  # laws that predict as well as those with more weight
+        # laws that predict as well as those with more weight
+        own = [name for name in chosen.names if chosen.family.get(name) == family]
         found.append(
             MissingFamily(
                 family, tuple(dict.fromkeys((*laws, *own))), share, chance_beside(others, chance, left) * held

@@ -130,12 +130,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
             trial = _trial_of(selection.chosen, contenders)
     least = weighing.detectable(contenders, selection.chosen)
     found, errors = weighing.settled(trial, contest, selection)
-    shown = () if unseen and weighing.passed(RERUN) else unseen
-    if shown:
-        case.tell("running both models over the held-out records")
-    nominal_there, chosen_there = (
-        rerun(one.model, shown, found.noise, one.run.max_step) for one in (found.nominal, found.fit)
-    )
+    nominal_there, chosen_there = weighing.over(unseen, found)
     return FreeRunResult(
         scoring,
         calibration,
@@ -152,7 +147,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Weighing:
     """The models of a search and what they are weighed with; `untried` grows by what there is no time for."""
 
@@ -306,6 +301,17 @@ class _Weighing:
         fit = with_robust_covariance(found.fit)
         errors = size_errors(fit.model, chosen.elements, fit.std)
         return replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed)), errors
+
+    def over(self, unseen: Sequence[Series], found: Search) -> tuple[Fit | None, Fit | None]:
+        """Free runs of the nominal and the chosen model over separate held-out records."""
+        shown = () if unseen and self.passed(RERUN) else unseen
+        if shown:
+            self.case.tell("running both models over the held-out records")
+        before, after = found.nominal, found.fit
+        return (
+            rerun(before.model, shown, found.noise, before.run.max_step),
+            rerun(after.model, shown, found.noise, after.run.max_step),
+        )
 
 
 def _followed(found: Search, case: Case) -> Search:

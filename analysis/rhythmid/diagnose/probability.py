@@ -13,16 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from rhythmid.diagnose.constants import (
-    ADEQUATE,
-    HOLDS,
-    OPEN,
-    PRIOR_ODDS,
-    STATED,
-    STEEPNESS,
-    VAGUE,
-    VAGUENESS,
-)
+from rhythmid.diagnose.constants import ADEQUATE, HOLDS, OPEN, PRIOR_ODDS, STATED, STEEPNESS, VAGUE, VAGUENESS
 from rhythmid.diagnose.evidence import probabilities
 from rhythmid.diagnose.hypothesis import Hypothesis
 from rhythmid.diagnose.rejections import keeps_shape

@@ -139,11 +139,7 @@ def keeps_shape(shape: Mapping[str, float]) -> bool:
 
 def _shape_rule(name: str, says: str, reason: str) -> Rule:
     return Rule(
-        name,
-        says,
-        reason,
-        lambda claim: claim.hypothesis.shape.get(name, math.inf),
-        lambda _: SHAPES[name],
+        name, says, reason, lambda claim: claim.hypothesis.shape.get(name, math.inf), lambda _: SHAPES[name]
     )
 
 

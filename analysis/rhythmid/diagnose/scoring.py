@@ -5,10 +5,11 @@ trajectory that the machine never took does not show what the model lacks. Windo
 shortened until the model follows the machine through them. (Recorded effort is scored by inverse dynamics, see `effort`.)
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import takewhile
 
 import numpy as np
 
@@ -26,7 +27,6 @@ from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 
-SHORTER = 2.0  # ratio of successive window lengths
 INTEGRATES = (
     "the model integrates or is unstable, so that a long free run would add up every small disturbance"
 )
@@ -82,27 +82,12 @@ def settle(
 
     Raises InputError when no length works.
     """
-    tried: list[Scoring] = []
-    idle = 0
-    failure: InputError | None = None
-    for how in _ladder(model, series):
-        if (how.kind == "windows" and not windows) or (tried and time_is_up()):
-            break
-        if how.kind != "free_run":
-            tell(f"scoring in {how.reason}")
-        try:
-            scoring = _scored(how, model, series, separate, catalogue, pool, tell)
-        except InputError as error:
-            failure = failure or error
-            continue
-        if tried and scoring.error > BETTER_STEP * tried[-1].error:
-            idle += 1
-            if idle == PATIENCE:
-                break
-            continue
-        tried.append(scoring)
-        if scoring.calibration.fit.nrmse() < FOLLOWS:
-            break
+
+    def scored(how: _Way) -> Scoring:
+        return _scored(how, model, series, separate, catalogue, pool, tell)
+
+    ways = takewhile(lambda how: windows or how.kind == "free_run", _ladder(model, series))
+    tried, failure = _tried(ways, scored, tell)
     if not windows:
         yield from (one for one in tried if one.calibration.fit.nrmse() < FOLLOWS)
         return
@@ -116,9 +101,8 @@ def settle(
         if time_is_up():
             return
         # windows do not show slow effects
-        free = _Way("free_run", DISTURBED_FREE_RUN, list)
         try:
-            disturbed = _scored(free, model, series, separate, catalogue, pool, tell)
+            disturbed = scored(_Way("free_run", DISTURBED_FREE_RUN, list))
         except InputError:
             return
         if disturbed.calibration.fit.nrmse() < FOLLOWS:
@@ -140,6 +124,34 @@ class _Way:
     kind: ScoringKind
     reason: str
     of: Callable[[Sequence[Series]], list[Series]]
+
+
+def _tried(
+    ways: Iterable[_Way], scored: Callable[[_Way], Scoring], tell: Tell
+) -> tuple[list[Scoring], InputError | None]:
+    """The results of the modes until one follows the machine, of which each is better than the one before; and the first failure."""
+    tried: list[Scoring] = []
+    idle = 0
+    failure: InputError | None = None
+    for how in ways:
+        if tried and time_is_up():
+            break
+        if how.kind != "free_run":
+            tell(f"scoring in {how.reason}")
+        try:
+            scoring = scored(how)
+        except InputError as error:
+            failure = failure or error
+            continue
+        if tried and scoring.error > BETTER_STEP * tried[-1].error:
+            idle += 1
+            if idle == PATIENCE:
+                break
+            continue
+        tried.append(scoring)
+        if scoring.calibration.fit.nrmse() < FOLLOWS:
+            break
+    return tried, failure
 
 
 def _scored(
@@ -171,7 +183,7 @@ def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
     length = max(float(np.median([periods_long(one) for one in series])), shortest)
     while length >= shortest:
         yield _Way("windows", _words(length, LOSES if free else INTEGRATES), partial(cut_up, length=length))
-        length /= SHORTER
+        length /= 2.0
 
 
 def _words(length: float, reason: str) -> str:

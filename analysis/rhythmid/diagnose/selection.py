@@ -86,14 +86,7 @@ class Contest:
     def claim(self, hypothesis: Hypothesis, without: Hypothesis, simpler: Hypothesis | None = None) -> Claim:
         """A hypothesis together with those with which it is compared."""
         return Claim(
-            hypothesis,
-            without,
-            self.nominal,
-            self.floor,
-            self.candidates,
-            self.size,
-            self.practical,
-            simpler,
+            hypothesis, without, self.nominal, self.floor, self.candidates, self.size, self.practical, simpler
         )
 
 

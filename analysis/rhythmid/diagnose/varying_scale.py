@@ -17,9 +17,8 @@ from rhythmid.identify.student import DEGREES, log_density, scale_of
 Array = NDArray[np.float64]
 # smallest scale of a block, relative to that of the others: a block with less error, such as a rest, holds nothing to predict
 QUIETEST = 0.01
-INFORMATION = (
-    2.0 * DEGREES / (DEGREES + 3.0)
-)  # information of one Student's t error on the logarithm of its scale
+# information of one Student's t error on the logarithm of its scale
+INFORMATION = 2.0 * DEGREES / (DEGREES + 3.0)
 
 
 def block_densities(
@@ -48,9 +47,8 @@ def block_densities(
     )
     information = INFORMATION * np.array([len(one) for one in errors]) / time
     variance = _between(own[seen], information[seen])
-    share = (
-        variance * information / (1.0 + variance * information)
-    )  # weight of a block's own scale in the estimate
+    # weight of a block's own scale in the estimate
+    share = variance * information / (1.0 + variance * information)
     shift = share * own
     found = np.array(
         [log_density(one, float(scale)).sum() for one, scale in zip(errors, scales * np.exp(shift))]

@@ -100,9 +100,8 @@ def _unsuitable(element: Element, setting: Setting, scales: Scales) -> str | Non
         return "it needs a controller in the model"
     if scales.idle and (element.driven or element.slot in ("command", "actuator", "timing")):
         return IDLE
-    turns = (
-        element.rotational and scales.high - scales.low >= 2.0 * math.pi
-    )  # what it does comes back with each turn
+    # what it does comes back with each turn
+    turns = element.rotational and scales.high - scales.low >= 2.0 * math.pi
     one_way = not (setting.restored or scales.comes_back or turns)
     if element.family == STIFFNESS and one_way:
         return ONE_WAY

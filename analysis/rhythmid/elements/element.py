@@ -214,13 +214,11 @@ class Element:
     rigid: bool = False
     candidate: bool = True  # used in the search for missing effects
     needless_with: tuple[str, ...] = ()
-    beyond: tuple[
-        str, ...
-    ] = ()  # effects that together are the law where a parameter is at the end of its range
+    # effects that together are the law where a parameter is at the end of its range
+    beyond: tuple[str, ...] = ()
     same_as: tuple[str, ...] = ()  # elements that give the same model with other parameters
-    same_beside: Mapping[str, str] = field(
-        default_factory=dict
-    )  # equivalences that hold beside another element
+    # equivalences that hold beside another element
+    same_beside: Mapping[str, str] = field(default_factory=dict)
     rotational: bool = False  # applies only where the position is an angle
     controlled: bool = False  # applies only where a controller in the command path closes the loop
     displaced_base: bool = False  # differs from another element only where the input displaces the base
@@ -228,9 +226,8 @@ class Element:
     # (**parameters) -> names and sizes of other elements that together give the same force while the machine moves
     moving_as: Callable[..., tuple[tuple[str, float], ...]] | None = None
     reversing: bool = False  # is told from dry friction by the way after a reversal of the motion alone
-    drifts: bool = (
-        False  # changes with time what the drive passes through: a gain that fades, a clock, a delay
-    )
+    # changes with time what the drive passes through: a gain that fades, a clock, a delay
+    drifts: bool = False
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
     ranges: Callable[[Scales], Mapping[str, tuple[float, float]]] | None = None
     hops: Callable[[Scales], Mapping[str, float]] | None = None

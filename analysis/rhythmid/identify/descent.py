@@ -122,14 +122,6 @@ def _with_priors(here: Linearisation, priors: Sequence[Prior | None], values: Ar
     return np.vstack([here.jacobian, extra]), np.concatenate([here.residual, distance])
 
 
-def _within(
-    jacobian: Array, residual: Array, damping: float, blocked: NDArray[np.bool_], least: Array, most: Array
-) -> tuple[Array, bool]:
-    """The step (p,) of `_step`, and whether it stops nowhere."""
-    step = _step(jacobian, residual, damping, blocked, least, most)
-    return step, bool(np.all(blocked | ((step > least) & (step < most))))
-
-
 def restarted(
     problem: Problem, model: Model, starts: Sequence[Array], residuals: Sequence[Array]
 ) -> tuple[list[Array], list[Array]]:
@@ -169,6 +161,148 @@ class Descent:
     linearisation: Linearisation | None
 
 
+@dataclass(frozen=True)
+class _Point:
+    """Parameters and initial states, with the residuals and the cost (chi2 and priors) there."""
+
+    model: Model
+    starts: list[Array]
+    residuals: list[Array]
+    cost: float
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """Bounds (p,) and priors of the parameters; only below its `brink` (p,) a parameter reaches its lower bound in one step.
+
+    `held` (q,) is 1 for memory states, whose steps are always damped.
+    """
+
+    names: Sequence[str]
+    low: Array
+    high: Array
+    brink: Array
+    priors: Sequence[Prior | None]
+    held: Array
+
+    @classmethod
+    def of(cls, problem: Problem, model: Model) -> "_Limits":
+        """The limits of a descent that begins at this model."""
+        known = [model.parameters[name] for name in problem.names]
+        low: Array = np.array([one.bounds[0] for one in known])
+        high: Array = np.array([one.bounds[1] for one in known])
+        brink = [a + BRINK * (one.value - a) if math.isfinite(a) else math.inf for one, a in zip(known, low)]
+        memories, states = problem.run.compiled.layout.memories, problem.run.states
+        held: Array = np.array([float(place in memories) for place in range(states)])
+        return cls(problem.names, low, high, np.array(brink), [one.prior for one in known], held)
+
+
+@dataclass(frozen=True)
+class _Tangent:
+    """A point's linearisation, with a row of `jacobian` and `residual` for each prior.
+
+    `series` are each series' whitened residual and sensitivities to parameters and initial states; `state_steps` (q,) are
+    the units of the latter. Parameters that are `blocked` (p,) would pass the bound at which they are.
+    """
+
+    limits: _Limits
+    values: Array
+    jacobian: Array
+    residual: Array
+    blocked: NDArray[np.bool_]
+    series: Sequence[tuple[Array, Array, Array]]
+    state_steps: Array
+
+    @classmethod
+    def of(
+        cls,
+        limits: _Limits,
+        model: Model,
+        here: Linearisation,
+        series: Sequence[tuple[Array, Array, Array]],
+        state_steps: Array,
+    ) -> "_Tangent":
+        """The tangent at a model."""
+        values: Array = np.array([model.value(name) for name in limits.names])
+        jacobian, residual = _with_priors(here, limits.priors, values)
+        gradient = jacobian.T @ residual
+        blocked = ((values <= limits.low) & (gradient > 0)) | ((values >= limits.high) & (gradient < 0))
+        return cls(limits, values, jacobian, residual, blocked, series, state_steps)
+
+    def step(self, point: _Point, damping: float) -> tuple[Model, list[Array], float, bool]:
+        """Model and starts after a step with this damping, the cost that it promises, and whether it stops nowhere."""
+        limits, values = self.limits, self.values
+        floor: Array = np.array(
+            [a + STAY * (v - a) if v > b else a for v, a, b in zip(values, limits.low, limits.brink)]
+        )
+        least, most = floor - values, limits.high - values
+        taken = _step(self.jacobian, self.residual, damping, self.blocked, least, most)
+        whole = bool(np.all(self.blocked | ((taken > least) & (taken < most))))
+        proposed: Array = np.clip(values + taken, floor, limits.high)
+        moved: list[Array] = []
+        promised: float = _prior_cost(limits.priors, proposed)
+        for start, (error, slope, state) in zip(point.starts, self.series):
+            ahead = error + slope @ (proposed - values)
+            # the other states are damped only where damping of parameters and memory states did not help
+            change = state_update(state, ahead, damping * np.where(damping > STATES, 1.0, limits.held))
+            moved.append(start + change * self.state_steps)
+            promised += float(np.sum((ahead + state @ change) ** 2))
+        return point.model.with_values(dict(zip(limits.names, proposed))), moved, promised, whole
+
+
+def _begun(problem: Problem, model: Model, starts: Sequence[Array] | None) -> _Point:
+    """The point at which a descent begins. Raises InputError where the model diverges there."""
+    current = [np.array(s) for s in (starts if starts is not None else first_guess(model, problem.run))]
+    problem.learn_hidden(model, current)
+    residuals = problem.residuals(model, current)
+    if starts is not None and residuals is not None:
+        current, residuals = restarted(problem, model, current, residuals)
+    cost = problem.cost(model, residuals, current)
+    if residuals is None or not math.isfinite(cost):
+        raise InputError(
+            "the model diverges when simulated over the records with its initial values; check its parameters and units"
+        )
+    return _Point(model, current, residuals, cost)
+
+
+def _lower(
+    problem: Problem, model: Model, starts: list[Array], residuals: list[Array] | None, most: float
+) -> _Point | None:
+    """The point, if its cost is below `most`."""
+    cost = problem.cost(model, residuals, starts)
+    return _Point(model, starts, residuals, cost) if residuals is not None and cost < most else None
+
+
+def _stepped(
+    problem: Problem, tangent: _Tangent, point: _Point, damping: float, enough: float
+) -> tuple[_Point, float, bool]:
+    """The point after a step with as much damping as it needs, the next damping, and whether the descent has converged:
+    the gain is below `enough`, or no direction lowers the cost further."""
+    for _ in range(12):
+        model, starts, promised, whole = tangent.step(point, damping)
+        if whole and damping <= LEAST_DAMPING and point.cost - promised < enough:
+            return point, damping, True
+        lower = _lower(problem, model, starts, problem.residuals(model, starts), point.cost)
+        if lower is not None:
+            return lower, max(damping * 0.1, 1e-12), point.cost - lower.cost < enough
+        damping = max(damping * 10.0, LEAST_DAMPING)
+        if damping > 1e8:
+            break
+        if time_is_up():
+            return point, damping, False
+    return point, damping, True
+
+
+def _from_other_starts(problem: Problem, tangent: _Tangent, point: _Point, enough: float) -> _Point | None:
+    """A point with lower cost at the same parameters, from initial states that no descent reaches."""
+    if tangent.limits.held.any():
+        starts = sought(problem, point.model, point.starts, tangent.series, tangent.state_steps)
+        residuals = problem.residuals(point.model, starts)
+    else:
+        starts, residuals = restarted(problem, point.model, point.starts, point.residuals)
+    return _lower(problem, point.model, starts, residuals, point.cost - enough)
+
+
 def descend(
     model: Model,
     run: FreeRun,
@@ -192,105 +326,41 @@ def descend(
     InputError when the model diverges at its initial values.
     """
     problem = Problem(run, names, noise, pool)
-    current: list[Array] = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]
-    problem.learn_hidden(model, current)
-    residuals = problem.residuals(model, current)
-    if starts is not None and residuals is not None:
-        current, residuals = restarted(problem, model, current, residuals)
-    cost = problem.cost(model, residuals, current)
-    if residuals is None or not math.isfinite(cost):
-        raise InputError(
-            "the model diverges when simulated over the records with its initial values; check its parameters and units"
-        )
-    if differences is None:
-        steps, state_steps = _settled_steps(problem, model, current, residuals, similar)
-    else:
-        steps, state_steps = differences
-    held: Array = np.array([float(place in run.compiled.layout.memories) for place in range(run.states)])
+    point = _begun(problem, model, starts)
+    steps, state_steps = differences or _settled_steps(problem, model, point.starts, point.residuals, similar)
+    limits = _Limits.of(problem, model)
     damping, converged, searched = LEAST_DAMPING, False, False
-    low: Array = np.array([model.parameters[name].bounds[0] for name in names])
-    high: Array = np.array([model.parameters[name].bounds[1] for name in names])
-    brink = [a + BRINK * (model.value(n) - a) if math.isfinite(a) else math.inf for n, a in zip(names, low)]
-    priors = [model.parameters[name].prior for name in names]
     blocked: NDArray[np.bool_] = np.zeros(len(names), bool)
     here: Linearisation | None = None
-    samples = sum(len(problem.whitened(i, r)) for i, r in enumerate(residuals))
-    costs = [cost]
+    samples = sum(len(problem.whitened(i, r)) for i, r in enumerate(point.residuals))
+    costs = [point.cost]
     for done in range(iterations):
         if time_is_up():
             break
-        if done >= PACE and out_of_reach(costs[-1 - PACE], cost, (iterations - done) / PACE, reach):
+        if done >= PACE and out_of_reach(costs[-1 - PACE], point.cost, (iterations - done) / PACE, reach):
             break
-        here, states, steps, state_steps_next = problem.linearise(
-            model, current, residuals, steps, state_steps
+        before, units = point, state_steps
+        here, series, steps, state_steps = problem.linearise(
+            point.model, point.starts, point.residuals, steps, state_steps
         )
-        values: Array = np.array([model.value(name) for name in names])
-        jacobian, residual = _with_priors(here, priors, values)
-        gradient = jacobian.T @ residual
-        blocked = ((values <= low) & (gradient > 0)) | ((values >= high) & (gradient < 0))
-        improved = cut = False
-        for _ in range(12):
-            floor: Array = np.array(
-                [a + STAY * (v - a) if v > b else a for v, a, b in zip(values, low, brink)]
-            )
-            taken, whole = _within(jacobian, residual, damping, blocked, floor - values, high - values)
-            proposed: Array = np.clip(values + taken, floor, high)
-            step: Array = proposed - values
-            trial = model.with_values(dict(zip(names, proposed)))
-            moved: list[Array] = []
-            promised: float = _prior_cost(priors, proposed)
-            for start, (error, slope, state) in zip(current, states):
-                ahead = error + slope @ step
-                # the other states are damped only where damping of parameters and memory states did not help
-                change = state_update(state, ahead, damping * np.where(damping > STATES, 1.0, held))
-                moved.append(start + change * state_steps)
-                promised += float(np.sum((ahead + state @ change) ** 2))
-            enough = max(tolerance * min(1.0, cost / samples), 1e-7 * cost)
-            if whole and damping <= LEAST_DAMPING and cost - promised < enough:
-                converged = True
-                break
-            trial_residuals = problem.residuals(trial, moved)
-            trial_cost = problem.cost(trial, trial_residuals, moved)
-            if trial_cost < cost:
-                gain = cost - trial_cost
-                model, current, cost = trial, moved, trial_cost
-                residuals, here = trial_residuals, None
-                damping = max(damping * 0.1, 1e-12)
-                improved = True
-                converged = gain < enough
-                break
-            damping = max(damping * 10.0, LEAST_DAMPING)
-            if damping > 1e8 or (cut := time_is_up()):
-                break
-        converged = converged or not (improved or cut)  # no direction lowers the cost further
+        tangent = _Tangent.of(limits, point.model, here, series, units)
+        blocked = tangent.blocked
+        enough = max(tolerance * min(1.0, point.cost / samples), 1e-7 * point.cost)
+        point, damping, converged = _stepped(problem, tangent, point, damping, enough)
         if converged and not searched:
-            if held.any():
-                searched, moved = True, sought(problem, model, current, states, state_steps)
-                trial_residuals = problem.residuals(model, moved)
-            else:
-                assert residuals is not None
-                moved, trial_residuals = restarted(problem, model, current, residuals)
-            trial_cost = problem.cost(model, trial_residuals, moved)
-            if trial_cost < cost - enough:
-                current, cost, residuals, here, damping, converged = (
-                    moved,
-                    trial_cost,
-                    trial_residuals,
-                    None,
-                    LEAST_DAMPING,
-                    False,
-                )
-        state_steps = state_steps_next
-        costs.append(cost)
-        assert residuals is not None
+            searched = bool(limits.held.any())
+            other = _from_other_starts(problem, tangent, point, enough)
+            if other is not None:
+                point, damping, converged = other, LEAST_DAMPING, False
+        here = here if point is before else None
+        costs.append(point.cost)
         if converged:
             break
-    assert residuals is not None
-    white = [problem.whitened(i, r) for i, r in enumerate(residuals)]
+    white = [problem.whitened(i, r) for i, r in enumerate(point.residuals)]
     return Descent(
-        model=model,
-        starts=tuple(current),
-        residuals=tuple(residuals),
+        model=point.model,
+        starts=tuple(point.starts),
+        residuals=tuple(point.residuals),
         chi2=float(sum(np.sum(w**2) for w in white)),
         samples=samples,
         converged=converged,

@@ -20,7 +20,9 @@ FARTHEST = 0.25  # largest lag on either side, as a share of a part
 # samples by which an output may seem to come before its command, and an estimated delay be negative: an input that is taken for held
 # but is not gives up to 1.5 samples
 EARLIEST = 1.5
-SURE = 4.0  # standard errors by which the lead must exceed that, as for a delay that comes out negative
+# standard errors by which the lead must exceed that, and a delay be negative, to be reported: with two, a machine without delay
+# would be reported once in 40 times
+SURE = 4.0
 # largest ratio of the residual at the best lead to that at the best lag: with a single sine either channel seems to
 # follow the other
 PLAINLY = 0.5

@@ -15,7 +15,7 @@ from rhythmid.identify.inputs import LONG, Pieces
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model
-from rhythmid.simulation.generated_source import InputKind, OutputKind, Variant
+from rhythmid.simulation.right_hand_side import InputKind, OutputKind, Variant
 from rhythmid.simulation.signal import is_held, pieces
 from rhythmid.simulation.simulate import start_states
 from rhythmid.simulation.transport import acting_delay, command_delay, physical_times

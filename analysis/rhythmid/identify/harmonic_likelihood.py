@@ -23,7 +23,7 @@ from rhythmid.ltp.pumping import Pumping
 from rhythmid.ltp.spectra import Spectra, spectra
 from rhythmid.model import Model
 from rhythmid.record.record import Record
-from rhythmid.simulation.generated_source import InputKind
+from rhythmid.simulation.right_hand_side import InputKind
 from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 
 Array = NDArray[np.float64]
@@ -230,11 +230,7 @@ def _descend(comparison: _Comparison, start: Array, tolerance: float = 1e-8) -> 
 
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 def harmonic_likelihood(
-    record: Record,
-    model: Model,
-    pumping: Pumping,
-    cycle: bool = True,
-    search: bool = False,
+    record: Record, model: Model, pumping: Pumping, cycle: bool = True, search: bool = False
 ) -> HarmonicFit:
     """Estimate the model's free parameters and both delays from one record, also from starting values that are far off.
 

@@ -50,6 +50,12 @@ class Offset:
     mean: float = 0.0
     std: float = math.inf
 
+    @property
+    def limits(self) -> str:
+        """The bounds in words."""
+        bounded = math.isfinite(self.high - self.low)
+        return f"between {self.low:g} and {self.high:g} s" if bounded else "unknown"
+
 
 def offset_of(bounds: tuple[float, float] | None, std: float | None) -> Offset | None:
     """The stated clock offset: bounds (low, high) [s] or a standard deviation [s]; None where neither is given.
@@ -219,40 +225,29 @@ def _of_paths(
     told = forcing or stated_by(joint)
     intervals = _intervals(first, second, total, None)
 
-    def only_sum(words: str, limits: dict[str, tuple[float, float]]) -> Delays:
+    def only_sum(words: str, limits: dict[str, tuple[float, float]] = intervals) -> Delays:
         return Delays(nothing, nothing, total, False, words, closure, (), limits, seen, directions)
 
     if first.std is None or second.std is None:
-        return only_sum("the records do not tell the two delays apart", intervals)
+        return only_sum("the records do not tell the two delays apart")
     if told == "delayed":
         return only_sum(
             "the forcing comes through the same delayed channel as the command: only the sum of the delays "
-            "is identifiable",
-            intervals,
+            "is identifiable"
         )
     if told == "clock_unknown":
         known = offset or Offset()
+        words = f"the offset of the forcing's clock is {known.limits}: each delay is only known to lie in an interval"
         if math.isfinite(known.std):
             shifted = _shifted(first, second, known)
             words = f"the forcing's clock is off by {known.mean:g} ± {known.std:g} s, as stated"
             return Delays(*shifted, total, True, words, closure, (), None, seen, directions)
-        limits = (
-            f"between {known.low:g} and {known.high:g} s"
-            if math.isfinite(known.high - known.low)
-            else "unknown"
-        )
-        words = (
-            f"the offset of the forcing's clock is {limits}: each delay is only known to lie in an interval"
-        )
         return only_sum(words, _intervals(first, second, total, known))
     step = max(record.output.period for record in joint.records)
-    assert first.value is not None and second.value is not None
-    zero = abs(first.value) < SEPARATE_BY * first.std + step
-    if told is None and zero and second.value > SEPARATE_BY * second.std + 2.0 * step:
+    if told is None and _alike_delayed(first, second, step):
         return only_sum(
             "the input delay comes out at zero, which is also what a forcing through the same delayed channel looks like; "
-            "state --forcing on_robot if the forcing is made on the robot, or --forcing delayed if it is not",
-            intervals,
+            "state --forcing on_robot if the forcing is made on the robot, or --forcing delayed if it is not"
         )
     words = (
         f"{source} acts on the machine undelayed, with its phase at its stamps (δ_f = 0)"
@@ -261,14 +256,18 @@ def _of_paths(
     return Delays(first, second, total, True, words, closure, aliases(joint), None, seen, directions)
 
 
+def _alike_delayed(first: Estimate, second: Estimate, step: float) -> bool:
+    """Whether the input delay, but not the measurement delay, comes out at zero, to a sample period `step` [s]."""
+    assert first.value is not None and first.std is not None
+    assert second.value is not None and second.std is not None
+    zero = abs(first.value) < SEPARATE_BY * first.std + step
+    return zero and second.value > SEPARATE_BY * second.std + 2.0 * step
+
+
 def _shifted(first: Estimate, second: Estimate, offset: Offset) -> tuple[Estimate, Estimate]:
     """Delays under a Gaussian prior on the offset δ_f: τ_u = C + δ_f, τ_y = A − δ_f."""
-    assert (
-        first.value is not None
-        and first.std is not None
-        and second.value is not None
-        and second.std is not None
-    )
+    assert first.value is not None and first.std is not None
+    assert second.value is not None and second.std is not None
     return (
         Estimate(first.value + offset.mean, math.hypot(first.std, offset.std), "s"),
         Estimate(second.value - offset.mean, math.hypot(second.std, offset.std), "s"),

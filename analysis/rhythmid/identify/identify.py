@@ -25,9 +25,10 @@ from rhythmid.identify.identifiability import Forcing, Offset, delays_of, of_tol
 from rhythmid.identify.identification import Delays, Estimate, Identification, Shown
 from rhythmid.identify.inner_delays import dead_times
 from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit, explained
-from rhythmid.identify.large_shifts import large_shifts, tells_nothing
+from rhythmid.identify.large_shifts import AGREES, large_shifts, tells_nothing
 from rhythmid.identify.moving import moving
 from rhythmid.identify.natural_size import are_told
+from rhythmid.identify.output_error import Fit
 from rhythmid.identify.own_zeros import with_own_zeros
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
 from rhythmid.identify.paper_conditions import lacks_paper_method, lacks_transfer_functions
@@ -53,7 +54,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Method = Literal["joint", "paper"]
-CLOSED = 5.0  # standard deviations of the closure above which a note is given
 FRACTION = 0.01  # share of a sample period: a smaller closure is a numerical error, whatever its std
 SOURCES = {
     "forcing channel": "the recorded forcing",
@@ -339,16 +339,7 @@ def _by_likelihood(
         joint, notes = replace(joint, fit=weighed(joint.fit, late)), (*notes, late.words)
     fit = with_discretisation_error(efficient_fit(joint.fit))
     joint = replace(joint, fit=fit, search=explained(fit, joint.pumping))
-    own = [name for name in fit.names if name not in DELAYS]
-    values = fit.model.parameters
     series = fit.run.series
-    told = are_told(fit.model, series, {name: (values[name].value, fit.std[name]) for name in own})
-    parameters = {
-        name: Estimate(
-            *((values[name].value, fit.std[name]) if name in told else (None, None)), values[name].unit
-        )
-        for name in own
-    }
     jitter = measurement_jitter(fit)
     late_by = (None, None) if late is None else (late.std, late.uncertainty)
     quality = quality_of(fit.nrmse(), records, paper) | {
@@ -360,14 +351,7 @@ def _by_likelihood(
     }
     delays = delays_of(joint, forcing, offset, SOURCES.get(seen.source, "the forcing"))
     delays = of_told_sum(delays, fit.model, series)
-    refused = {
-        name
-        for name, label in dead_times(fit.model).items()
-        if label in delays.inner and not delays.inner[label].separable
-    }
-    parameters = {
-        name: replace(e, value=None, std=None) if name in refused else e for name, e in parameters.items()
-    }
+    parameters = _told_values(fit, delays)
     cautions = seen.judged(fit.model, parameters, delays, joint, fit.nrmse())
     if _open(delays, records[0].output.period):
         notes += (
@@ -382,10 +366,23 @@ def _by_likelihood(
     )  # fmt: skip
 
 
+def _told_values(fit: Fit, delays: Delays) -> dict[str, Estimate]:
+    """Estimates of all parameters but the delays, without those of which the records tell nothing."""
+    known = fit.model.parameters
+    found = {name: (known[name].value, fit.std[name]) for name in fit.names if name not in DELAYS}
+    inner = {name: delays.inner.get(label) for name, label in dead_times(fit.model).items()}
+    refused = {name for name, one in inner.items() if one is not None and not one.separable}
+    told = set(are_told(fit.model, fit.run.series, found)) - refused
+    return {
+        name: Estimate(*(pair if name in told else (None, None)), known[name].unit)
+        for name, pair in found.items()
+    }
+
+
 def _open(delays: Delays, period: float) -> bool:
     """Whether limit cycle and response to the command give different delays; `period` is the sample period [s]."""
     seen = delays.observables
-    if seen is None or delays.closure is None or abs(delays.closure) <= CLOSED:
+    if seen is None or delays.closure is None or abs(delays.closure) <= AGREES:
         return False
     gap = (seen.phase.value or 0.0) + (seen.offset.value or 0.0) - (seen.slope.value or 0.0)
     return abs(gap) > FRACTION * period

@@ -18,9 +18,8 @@ FIRST_INTERVALS = 3  # number of intervals from which rest at the start is decid
 REST_SPEED = 0.2  # largest speed at rest, relative to the rms speed of the whole record; that of a running machine is 1
 # least size of the first step, relative to the span of the input afterwards: 0.5 for a wave that begins at its peak, 1 for a pulse
 LEAST_STEP = 0.75
-CLEAR_STEP = (
-    8.0  # least step of the position from which a speed is computed, in standard deviations of its noise
-)
+# least step of the position from which a speed is computed, in standard deviations of its noise
+CLEAR_STEP = 8.0
 
 
 def value_before(record: Record) -> float | None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from rhythmid.identify.caution import Caution
+from rhythmid.identify.early_output import SURE
 from rhythmid.identify.identification import Delays, Estimate
 from rhythmid.identify.plausibility import gains
 from rhythmid.model import Model
@@ -16,11 +17,8 @@ from rhythmid.report.quantity import number, rounded, with_written_unit
 TIMES = 4.0  # ratio of an estimate to the nominal value above which the shift is reported
 # sample periods by which a delay may exceed the nominal one: a longer one is seldom transport delay alone
 SAMPLES = 10.0
-MILLION = 1e6  # ratio above which only the shift is reported: one of the two values is not physical
 PASSED_BY = 2.0  # standard deviations by which an estimate has to exceed a limit
-# standard deviations, and a share of a sample, by which a delay has to be negative to be reported: with two
-# standard deviations, a machine without delay would be reported once in 40 times
-EARLY, EARLY_LEAST = 4.0, 0.05
+EARLY_LEAST = 0.05  # share of a sample by which a delay has to be negative to be reported
 # standard deviations of the closure within which limit cycle and response agree about the delays
 AGREES = 5.0
 ABSORBING = "the fit may be absorbing missing physics"
@@ -75,9 +73,9 @@ def _values(nominal: Model, parameters: Mapping[str, Estimate]) -> Iterator[Caut
 
 def _times(ratio: float) -> str:
     """The ratio to the nominal value in words; without a number where it is a million or more."""
-    if abs(ratio) >= MILLION:
+    if abs(ratio) >= 1e6:
         return "more than a million times"
-    if 0.0 < ratio <= 1.0 / MILLION:
+    if 0.0 < ratio <= 1e-6:
         return "less than a millionth of"
     return f"{number(ratio, 2)} times" if not 0.0 < ratio < 1.0 else f"a {number(1.0 / ratio, 2)}th of"
 
@@ -85,7 +83,7 @@ def _times(ratio: float) -> str:
 def _negative_delays(nominal: Model, delays: Delays, period: float) -> Iterator[Caution]:
     """Negative delays, with which the machine would respond before the command."""
     for side, found, expected in _estimated(nominal, delays):
-        if found.value is None or found.value >= -max(EARLY * (found.std or 0.0), EARLY_LEAST * period):
+        if found.value is None or found.value >= -max(SURE * (found.std or 0.0), EARLY_LEAST * period):
             continue
         yield Caution(
             "negative_delay",

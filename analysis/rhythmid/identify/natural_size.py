@@ -18,7 +18,6 @@ from rhythmid.identify.series import Series
 from rhythmid.model import INERTIA, Model
 
 Array = NDArray[np.float64]
-TWO_SIDED = 2.0  # standard deviations to either side, within which a value lies with 95 %
 
 
 def natural_size(unit: str, known: Scales) -> float | None:
@@ -43,7 +42,7 @@ def is_told(value: float, std: float, natural: float | None) -> bool:
 
     Else the parameter may be absent as well as all that there is.
     """
-    return std < (max(abs(value), (natural or 0.0) / TWO_SIDED) or 1.0)
+    return std < (max(abs(value), (natural or 0.0) / 2.0) or 1.0)
 
 
 def are_told(

@@ -269,19 +269,21 @@ class Problem:
             states.append((joined[:, 0], joined[:, 1 : 1 + p], joined[:, 1 + p :]))
             places.append(slice(place, place + len(white)))
             place += len(white)
-        target = 1e-4 * self.spread
-        ratio = np.clip(target / np.maximum(moved, 1e-30), 1e-3, 1e3)
-        # a clock's tick has an effect once a step passes it; a parameter without effect never has
-        unseen = moved < SEEN * self.spread
-        most = np.append(
-            [abs(model.value(name)) or self.spread for name in self.names], np.full(q, self.spread)
-        )
-        larger = np.maximum(most / np.append(np.abs(steps), np.abs(state_steps)), 1.0)
-        ratio[unseen] = np.minimum(ratio, larger)[unseen]
+        ratio = self._ratio(model, moved, np.append(np.abs(steps), np.abs(state_steps)))
         linearisation = Linearisation(
             np.concatenate(rows), np.concatenate(columns), tuple(bases), tuple(places), signed, state_steps
         )
         return linearisation, states, steps * ratio[:p], state_steps * ratio[p:]
+
+    def _ratio(self, model: Model, moved: Array, steps: Array) -> Array:
+        """Ratio (p + q,) of the next to the present `steps`, which `moved` the outputs by this rms."""
+        ratio = np.clip(1e-4 * self.spread / np.maximum(moved, 1e-30), 1e-3, 1e3)
+        # a clock's tick has an effect once a step passes it; a parameter without effect never has
+        unseen = moved < SEEN * self.spread
+        values = [abs(model.value(name)) or self.spread for name in self.names]
+        most = np.append(values, np.full(self.run.states, self.spread))
+        ratio[unseen] = np.minimum(ratio, np.maximum(most / steps, 1.0))[unseen]
+        return ratio
 
 
 def state_update(sensitivity: Array, target: Array, damping: Array | None = None) -> Array:

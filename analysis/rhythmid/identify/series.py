@@ -22,7 +22,7 @@ from rhythmid.motion_power import motion_power
 from rhythmid.record.record import Record
 from rhythmid.record.rounding import resolution
 from rhythmid.record.timing import nominal_period
-from rhythmid.simulation.generated_source import InputKind, OutputKind
+from rhythmid.simulation.right_hand_side import InputKind, OutputKind
 from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, is_held, is_smooth, spline
 
 # share of blocks with a gap above which timestamps are too uneven for averaging; rare gaps cost fewer
@@ -249,46 +249,7 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
 
     Raises InputError for a record that is too short, or with values that are not finite.
     """
-    made: list[Series] = []
-    for record in records:
-        _check(record)
-        time, value = record.output.time, record.output.value
-        if len(time) < 16:
-            raise InputError(
-                f"{record.name}: has only {len(time)} samples of the output; at least 16 are needed"
-            )
-        period = nominal_period(np.diff(time))
-        command, before = None, value_before(record)
-        if record.input is not None and len(record.input.time) > 1:
-            if before is not None:
-                command = stepped(record, before)
-            elif record.input_kind == "base_displacement" and record.hold == "zero":
-                command = _spline_of(record.input.time, record.input.value)
-            elif record.input_kind == "reference" and record.hold == "zero":
-                command = continuous(*_held_before(record.input.time, record.input.value), "zero")
-            else:
-                command = continuous(record.input.time, record.input.value, record.hold)
-        forcing = None
-        if record.forcing is not None and np.any(record.forcing.value != 0.0):
-            forcing = _spline_of(record.forcing.time, record.forcing.value)
-        made.append(
-            Series(
-                record.name,
-                time,
-                value,
-                command,
-                forcing,
-                1,
-                np.ones(len(time), bool),
-                period,
-                record.input_kind,
-                record.output_kind,
-                parameters=record.parameters,
-                record=record.whole,
-                resolution=resolution(value),
-                one_clock=record.one_clock,
-            )
-        )
+    made = [_series_of(record) for record in records]
     if block is None:
         block = min(block_length(s.value, s.period) for s in longest_of_each(made))
     whole = [_whole_blocks(s, block) for s in made]
@@ -301,6 +262,44 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
         replace(s, spread=next(spreads)) if record.stamped else s
         for s, record in zip(made, records, strict=True)
     ]
+
+
+def _series_of(record: Record) -> Series:
+    """The series of a record, not averaged."""
+    _check(record)
+    time, value, forcing = record.output.time, record.output.value, record.forcing
+    if len(time) < 16:
+        raise InputError(f"{record.name}: has only {len(time)} samples of the output; at least 16 are needed")
+    return Series(
+        record.name,
+        time,
+        value,
+        _command_of(record),
+        _spline_of(forcing.time, forcing.value) if forcing is not None and forcing.value.any() else None,
+        1,
+        np.ones(len(time), bool),
+        nominal_period(np.diff(time)),
+        record.input_kind,
+        record.output_kind,
+        parameters=record.parameters,
+        record=record.whole,
+        resolution=resolution(value),
+        one_clock=record.one_clock,
+    )
+
+
+def _command_of(record: Record) -> PPoly | None:
+    """The command between its samples, as the record says that it is held."""
+    given, before = record.input, value_before(record)
+    if given is None or len(given.time) < 2:
+        return None
+    if before is not None:
+        return stepped(record, before)
+    if record.hold == "zero" and record.input_kind == "base_displacement":
+        return _spline_of(given.time, given.value)
+    if record.hold == "zero" and record.input_kind == "reference":
+        return continuous(*_held_before(given.time, given.value), "zero")
+    return continuous(given.time, given.value, record.hold)
 
 
 def record_of(series: Series) -> str:

@@ -99,9 +99,8 @@ def sum_of(fit: Fit, *names: str) -> Estimate:
     norm = np.linalg.norm(fit.linearisation.jacobian[:, places].sum(axis=1)) if places.any() else 0.0
     own = fit.covariance[np.ix_(places, places)]
     variance = float(own.sum()) if np.isfinite(own).all() else math.inf
-    if (
-        places.sum() > 1 and not 0.0 < variance < 1.0
-    ):  # the sum of two undetermined parameters is lost in their rounding errors
+    # the sum of two undetermined parameters is lost in their rounding errors
+    if places.sum() > 1 and not 0.0 < variance < 1.0:
         variance = 1.0 / max(_projected(fit, places) ** 2, 1e-300) if norm > 0.0 else math.inf
     std = math.sqrt(variance) if variance >= 0.0 else math.inf
     return Estimate(float(value), std if math.isfinite(std) and std < 1e6 else None, "s")

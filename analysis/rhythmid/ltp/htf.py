@@ -16,7 +16,7 @@ from rhythmid.ltp.limit_cycle import LimitCycle, limit_cycle
 from rhythmid.ltp.linearisation import linearise
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
-from rhythmid.simulation.generated_source import InputKind
+from rhythmid.simulation.right_hand_side import InputKind
 from rhythmid.simulation.transport import MEASUREMENT, delays
 
 if TYPE_CHECKING:

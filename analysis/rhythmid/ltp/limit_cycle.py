@@ -16,7 +16,7 @@ from rhythmid.errors import InputError
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model, compile_rates
-from rhythmid.simulation.generated_source import InputKind, Variant
+from rhythmid.simulation.right_hand_side import InputKind, Variant
 from rhythmid.simulation.signal import pieces
 from rhythmid.simulation.simulate import MAX_STEP, start_states
 
@@ -208,9 +208,8 @@ def limit_cycle(
             f"period to the next by {error:.1e} of its size; the machine is not damped or its motion is not periodic"
         )
     jacobian = period_map.jacobian(start, scale)
-    for (
-        place
-    ) in period_map.compiled.layout.memories:  # its rate gives the change since then, see `right_hand_side`
+    # its rate gives the change since then, see `right_hand_side`
+    for place in period_map.compiled.layout.memories:
         states[:, place] = np.interp(grid - MAX_STEP, grid, states[:, place], period=pumping.period)
     rates = right_hand_side(model, pumping, excited)(grid, states[None])[0, :, : len(start)]
     return LimitCycle(

@@ -166,9 +166,8 @@ def regularised_least_squares(
         np.mean(np.abs(spectra.input[(spectra.frequency >= low) & (spectra.frequency <= high)]) ** 2)
     )
     if alpha is None:
-        t_c = window or max(
-            RING_DOWNS * ring_down, 0.5 / high
-        )  # a band up to `high` resolves no shorter time
+        # a band up to `high` resolves no shorter time
+        t_c = window or max(RING_DOWNS * ring_down, 0.5 / high)
         alpha = mean / (2.0 * np.pi * spectra.resolution * t_c) ** 4
     else:
         t_c = (mean / alpha) ** 0.25 / (2.0 * np.pi * spectra.resolution)
@@ -229,9 +228,6 @@ def estimate_htf(operator: RegularisedLeastSquares) -> HtfEstimate:
     noise = float(np.sqrt(np.sum(np.abs(residual) ** 2) / (used.sum() - taken)))
     keep = operator.positive
     htf = HarmonicTransferFunctions(
-        operator.harmonics,
-        operator.frequency[keep],
-        found[:, keep],
-        noise * gain[:, keep],
+        operator.harmonics, operator.frequency[keep], found[:, keep], noise * gain[:, keep]
     )
     return HtfEstimate(htf, operator.reached[:, keep], operator, noise, found)

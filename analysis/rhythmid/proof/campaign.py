@@ -27,12 +27,8 @@ from rhythmid.proof.perform import perform
 from rhythmid.proof.score import Score, score
 from rhythmid.proof.seal import seal, truth_of, unseal
 
-SHARES: dict[Kind, int] = {
-    "single": 3,
-    "null": 3,
-    "pairs": 1,
-    "left-out": 1,
-}  # proportions in a campaign of all kinds
+# proportions in a campaign of all kinds
+SHARES: dict[Kind, int] = {"single": 3, "null": 3, "pairs": 1, "left-out": 1}
 LIFETIME = 40  # cases after which a worker process is replaced
 ALL = "all"  # machines
 SEALED, CASES = "sealed", "cases"

@@ -23,10 +23,8 @@ LEAST_EFFORT, MOST_EFFORT = (
 )  # limits of the mismatch, rms as a share of the effort, where it is a force
 CLUTTER = 3  # small effects beside the main one
 CLUTTER_SHARE = (0.005, 0.1)  # as a share of the main one's mismatch
-NULL_CLUTTER = (
-    3e-4,
-    1.5e-3,
-)  # as a share of the motion, for each of the small effects where there is no main one
+# as a share of the motion, for each of the small effects where there is no main one
+NULL_CLUTTER = (3e-4, 1.5e-3)
 NULL_CLUTTER_MOST = 3e-3  # the same for all together
 CLUTTER_CLOSE, CLUTTER_TRIES = 1.6, 4  # tolerance factor and number of tries for a small effect's size
 

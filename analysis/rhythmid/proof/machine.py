@@ -172,9 +172,8 @@ def observe(
     layout = np.vstack([np.zeros((1, 3), int), np.cumsum(widths, axis=0)]).astype(np.int64)
     parameters = [effect.parameters[name] for effect, one in zip(inside, known) for name in one.parameters]
     begin, (position, speed) = (time[0] - WARM_UP, (machine.rest, 0.0)) if start is None else (time[0], start)
-    before = (
-        position if machine.mode == "continuous" and start is not None else 0.0
-    )  # a servo starts at its first reference
+    # a servo starts at its first reference
+    before = position if machine.mode == "continuous" and start is not None else 0.0
     first = np.array([position, speed, *(share * position for one in known for share in one.states)])
     held = _memory(machine, inside, position, float(begin))
     out, efforts = np.empty((len(taken), COLUMNS)), np.zeros(len(arrival))

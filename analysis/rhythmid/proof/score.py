@@ -146,11 +146,9 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
     if outcome == "undecided" and _all_alike(true, families, DESIGNS[truth["design"]].alike):
         outcome = "family"
     ranked = _ranked(answer)
-    slots = {catalogue[name].slot for name in true}
+    said = {effect["slot"] for effect in answer.get("missing", ())}
     if len(true) == 1:
         said = {(answer.get("location") or {}).get("slot")}
-    else:
-        said = {effect["slot"] for effect in answer.get("missing", ())}
     return Score(
         case=truth["name"],
         kind=truth["kind"],
@@ -173,7 +171,7 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
         dominant_first=bool(ranked) and bool(stands_for[ranked[0]["element"]] & set(true)),
         verdict=answer.get("verdict", "failed"),
         outcome=outcome,
-        slot_right=bool(true) and said == slots,
+        slot_right=bool(true) and said == {catalogue[name].slot for name in true},
         ratio=truth["ratio"],
         faintest=min((one["ratio"] for one in concealed), default=0.0),
         noise=truth["noise"]["kind"],

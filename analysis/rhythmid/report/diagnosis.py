@@ -3,17 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rhythmid.report.blocks import (
-    Block,
-    Bullets,
-    Equation,
-    Heading,
-    Paragraph,
-    Section,
-    Table,
-    Tile,
-    Tiles,
-)
+from rhythmid.report.blocks import Block, Bullets, Equation, Heading, Paragraph, Section, Table, Tile, Tiles
 from rhythmid.report.correlation import correlation_figure
 from rhythmid.report.findings import Findings
 from rhythmid.report.hypotheses import hypotheses_section, rejections_section
@@ -98,36 +88,30 @@ def _words(found: Findings) -> str:
     return f"{said}."
 
 
+def _heldout(found: Findings) -> str:
+    """The error on held-out data before and after, with its uncertainty."""
+    fit = found.result["fit"]
+    unseen = [run for run in found.runs if run.heldout]
+    shown = unseen or [run for run in found.runs if run.hidden.any()]
+    before, after = (error_of(shown, which, not unseen) for which in ("before", "after"))
+    value = percent(fit["refitted_nominal"]["heldout_nrmse"], before.half if before else None)
+    if not found.repaired:
+        return value
+    return f"{value} → {percent(fit['augmented']['heldout_nrmse'], after.half if after else None)}"
+
+
 def _tiles(found: Findings) -> Tiles:
     result = found.result
-    fit, detection = result["fit"], result["detection"]
+    detection = result["detection"]
     tiles: list[Tile] = []
     for effect in result["missing"]:
         first = next(iter(effect["parameters"].items()), None)
         if first is not None:
-            tiles.append(
-                Tile(
-                    f"{found.title(effect['element'])}: {pretty_name(first[0])}",
-                    told(first[1]),
-                    "95 % interval",
-                )
-            )
-    held = fit["refitted_nominal"]["heldout_nrmse"], fit["augmented"]["heldout_nrmse"]
-    unseen = [run for run in found.runs if run.heldout]
-    hidden = not unseen
-    shown = unseen or [run for run in found.runs if run.hidden.any()]
-    if held[0] is not None:
-        before, after = error_of(shown, "before", hidden), error_of(shown, "after", hidden)
-        value = percent(held[0], before.half if before else None)
-        if found.repaired:
-            value += f" → {percent(held[1], after.half if after else None)}"
-        tiles.append(
-            Tile(
-                f"error on held-out data, of the {found.compared.quantity}",
-                value,
-                "before → after" if found.repaired else "",
-            )
-        )
+            name = f"{found.title(effect['element'])}: {pretty_name(first[0])}"
+            tiles.append(Tile(name, told(first[1]), "95 % interval"))
+    if result["fit"]["refitted_nominal"]["heldout_nrmse"] is not None:
+        note = "before → after" if found.repaired else ""
+        tiles.append(Tile(f"error on held-out data, of the {found.compared.quantity}", _heldout(found), note))
     if found.noise is not None:
         tiles.append(
             Tile(
@@ -242,10 +226,7 @@ def _better(found: Findings) -> Section:
             lead += f", and {percent(fit['refitted_nominal']['heldout_nrmse'])} on data that no fit has seen"
     said = f"{sentence(str(result.get('heldout') or 'nothing was held out'))} {_scored(result['scoring'])}"
     as_given = result["detection"]["nominal_nrmse"]
-    blocks: list[Block] = [
-        Paragraph(f"{lead}.", "lead"),
-        Paragraph(said),
-    ]
+    blocks: list[Block] = [Paragraph(f"{lead}.", "lead"), Paragraph(said)]
     if as_given is not None:
         blocks.append(Paragraph(f"Before any refit, the nominal model as given: {percent(as_given)}."))
     if found.runs:

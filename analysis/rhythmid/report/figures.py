@@ -80,9 +80,8 @@ def phase_figure(panels: Panels) -> Figure:
     for m, axis in axes.items():
         for curve in panels[m]:
             value = np.angle(curve.value)
-            if (
-                STYLES[curve.kind]["linestyle"] != "none"
-            ):  # a line must not cross the plot where the phase wraps
+            # a line must not cross the plot where the phase wraps
+            if STYLES[curve.kind]["linestyle"] != "none":
                 value[1:][np.abs(np.diff(value)) > np.pi] = np.nan
             _draw(axis, curve, value)
         axis.set_ylim(-np.pi, np.pi)

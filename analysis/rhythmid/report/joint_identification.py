@@ -27,15 +27,7 @@ from rhythmid.report.blocks import (
 from rhythmid.report.chart import Chart, Curve
 from rhythmid.report.correlation import Correlation, correlation_figure
 from rhythmid.report.page import Page
-from rhythmid.report.quantity import (
-    NONE,
-    number,
-    percent,
-    pretty_name,
-    pretty_unit,
-    rounded,
-    sentence,
-)
+from rhythmid.report.quantity import NONE, number, percent, pretty_name, pretty_unit, rounded, sentence
 from rhythmid.report.robot_figure import DrawnJoint, robot_svg
 from rhythmid.report.sections import reproduce_section
 

@@ -49,12 +49,7 @@ def chart_data(chart: Chart, most: int) -> str:
         "path": chart.path,
         "link": chart.link,
         "x": {"label": chart.x_label, "log": chart.x_log, "range": x_extent(chart)},
-        "y": {
-            "label": chart.y_label,
-            "log": chart.y_log,
-            "range": y_extent(chart),
-            "zero": chart.from_zero,
-        },
+        "y": {"label": chart.y_label, "log": chart.y_log, "range": y_extent(chart), "zero": chart.from_zero},
         "shaded": chart.shaded,
         "levels": chart.levels,
         "uprights": chart.uprights,
@@ -143,10 +138,7 @@ def _grid(x: Array, most: int) -> dict[str, Any]:
         apart = float(places[1] - places[0])
         return {"count": len(places), "first": first + step * float(places[0]), "step": step * apart}
     origin = float(x[0]) if len(x) else 0.0
-    return {
-        "first": origin,
-        "float32": _base64((x[np.minimum(places, len(x) - 1)] - origin).astype("<f4")),
-    }
+    return {"first": origin, "float32": _base64((x[np.minimum(places, len(x) - 1)] - origin).astype("<f4"))}
 
 
 def _values(y: Array, log: bool = False) -> dict[str, Any]:

@@ -28,18 +28,7 @@ TELLING = 0.05  # share of the mismatch above which a free function is shown
 
 def location_section(found: Findings) -> Section:
     result = found.result
-    slot = result["location"]["slot"]
-    missing: dict[str, list[str]] = {}
-    for effect in result["missing"]:
-        missing.setdefault(effect["slot"], []).append(found.title(effect["element"]))
-    slots = {
-        name: SlotContent(
-            tuple(map(found.title, found.slots.get(name, ()))),
-            tuple(missing.get(name, ())),
-            not missing and name == slot,
-        )
-        for name in ("command", "actuator", "force", "sensor", "timing")
-    }
+    slots = _slots(found)
     faulty = [name for name, content in slots.items() if content.faulty]
     alt = "Signal path from the command u through command, actuator, force and sensor to the output y. " + (
         f"Marked as faulty: {', '.join(faulty)}." if faulty else "No slot is marked."
@@ -76,7 +65,7 @@ def location_section(found: Findings) -> Section:
                 f"{number(place.frequency, 3)} Hz, which carries {percent(place.share)} of its power."
             )
         )
-    figures = [figure for figure in (_slot_scores(found, slot), _dependences(found)) if figure is not None]
+    figures = [one for one in (_slot_scores(found), _dependences(found)) if one is not None]
     if figures:
         blocks.append(Columns(tuple(figures)))
     evidence = tuple(result["location"]["evidence"])
@@ -85,7 +74,23 @@ def location_section(found: Findings) -> Section:
     return Section("Where model and machine differ", tuple(blocks))
 
 
-def _slot_scores(found: Findings, slot: str | None) -> Drawing | None:
+def _slots(found: Findings) -> dict[str, SlotContent]:
+    """What each slot of the signal path contains, and which is faulty."""
+    missing: dict[str, list[str]] = {}
+    for effect in found.result["missing"]:
+        missing.setdefault(effect["slot"], []).append(found.title(effect["element"]))
+    return {
+        name: SlotContent(
+            tuple(map(found.title, found.slots.get(name, ()))),
+            tuple(missing.get(name, ())),
+            not missing and name == found.result["location"]["slot"],
+        )
+        for name in ("command", "actuator", "force", "sensor", "timing")
+    }
+
+
+def _slot_scores(found: Findings) -> Drawing | None:
+    slot = found.result["location"]["slot"]
     best: dict[str, ElementScore] = {}
     for one in found.scores:
         if one.slot not in best or one.statistic > best[one.slot].statistic:

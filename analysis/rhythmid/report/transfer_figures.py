@@ -85,9 +85,8 @@ def _phase(one: TransferFunction, name: str, band: Array | None, magnitude: Arra
         strong &= magnitude > band
     guide = one.value if one.model is None else one.model
     turns = np.degrees(np.unwrap(np.angle(guide)))
-    phase = turns + np.degrees(
-        np.angle(one.value * guide.conj())
-    )  # on the model's own turn, however noisy it is
+    # on the model's own turn, however noisy it is
+    phase = turns + np.degrees(np.angle(one.value * guide.conj()))
     phase[~strong] = np.nan
     half = None if band is None else np.degrees(np.arctan2(band, np.maximum(magnitude, 1e-300)))
     curves = [

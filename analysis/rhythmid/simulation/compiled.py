@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.model import Model, Term
-from rhythmid.simulation.generated_source import InputKind, Layout, Variant, generate, generate_rates
+from rhythmid.simulation.generated_source import Layout, generate, generate_rates
 from rhythmid.simulation.machine_code import Module, load_run
+from rhythmid.simulation.right_hand_side import InputKind, Variant
 
 
 @dataclass(frozen=True)

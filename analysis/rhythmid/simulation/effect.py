@@ -6,7 +6,7 @@ elements that need a full simulation. Compiled once per element, for all models.
 
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -48,89 +48,85 @@ class Path:
         return np.gradient(self.velocity, self.time) if self.acceleration is None else self.acceleration
 
 
-def _module(element: Element) -> Module:
-    p = [f"p{i}" for i in range(len(element.parameters) + len(element.borrows))]
-    s = [f"s{i}" for i in range(len(element.own))]
-    flowing = len(element.states)  # the first ones of `s`; the others are memory states
-    sources = [
-        *(parameter.name for parameter in element.parameters),
-        *(source for source, _ in element.borrows.values()),
-    ]
-    signal = "f" if element.slot in ("command", "actuator") else "y"
-    names = LEADING[element.slot, element.acts]
-    if element.slot == "force":
-        arguments, change = list(names), "value - leg" if element.acts == "modifier" else "value"
-    else:
-        arguments, change = ["z" if name == signal else name for name in names], "value - z"
-    rows = ["x", "v", "f", "leg", "z", *FURTHER.get(element.acts, ())]
+def _rows(element: Element) -> list[str]:
+    """Names of the path's rows."""
+    return ["x", "v", "f", "leg", "z", *FURTHER.get(element.acts, ())]
 
-    def call(at: str, number: int, states: list[str], elapsed: str) -> list[str]:
-        sets = "; ".join(f"{name} = {name}0 + {at} * ({name}1 - {name}0)" for name in rows)
-        targets = ", ".join(["value", *(f"a{number}_{i}" for i in range(len(s)))])
-        given = [elapsed if source == ELAPSED else name for name, source in zip(p, sources)]
-        return [
-            sets,
-            f"t = begin + {at} * width",
-            f"{targets} = kernel({', '.join([*arguments, *given, *states])})",
-        ]
+
+def _call(element: Element, at: str, number: int, states: list[str], elapsed: str) -> list[str]:
+    """Lines that evaluate the element at this share of the way to the next sample."""
+    signal = {"force": "", "command": "f", "actuator": "f"}.get(element.slot, "y")
+    arguments = ["z" if name == signal else name for name in LEADING[element.slot, element.acts]]
+    borrowed = (source for source, _ in element.borrows.values())
+    sources = [*(parameter.name for parameter in element.parameters), *borrowed]
+    given = [elapsed if source == ELAPSED else f"p{i}" for i, source in enumerate(sources)]
+    targets = ["value", *(f"a{number}_{i}" for i in range(len(element.own)))]
+    return [
+        "; ".join(f"{name} = {name}0 + {at} * ({name}1 - {name}0)" for name in _rows(element)),
+        f"t = begin + {at} * width",
+        f"{', '.join(targets)} = kernel({', '.join([*arguments, *given, *states])})",
+    ]
+
+
+def _steps(element: Element) -> list[str]:
+    """Lines that take the states to the next sample: Runge-Kutta steps for those that flow, then the memories."""
+    s = [f"s{i}" for i in range(len(element.own))]
+    flowing = len(element.states)  # the first ones of `s`
+    if not s:
+        return []
 
     def moved(weight: str, number: int) -> list[str]:
         return [f"{name} + {weight} * a{number}_{i}" if i < flowing else name for i, name in enumerate(s)]
 
-    body: list[str] = []
-    if s:
-        inner = [
-            "at = substep / substeps", *call("at", 1, s, "0.0"),
-            "at = (substep + 0.5) / substeps",
-            *call("at", 2, moved("0.5 * h", 1), "0.5 * h"), *call("at", 3, moved("0.5 * h", 2), "0.5 * h"),
-            "at = (substep + 1.0) / substeps", *call("at", 4, moved("h", 3), "h"),
-            *(f"{n} = {n} + h / 6.0 * (a1_{i} + 2.0 * (a2_{i} + a3_{i}) + a4_{i})" for i, n in enumerate(s[:flowing])),
-        ] if flowing else ["at = 1.0"]  # fmt: skip
-        if element.memories:
-            inner += [*call("at", 1, s, "h"), *(f"s{i} = a1_{i}" for i in range(flowing, len(s)))]
-        body = [
-            "substeps = max(1, int(math.ceil(width / max_step * (1.0 - 1e-9))))"
-            if flowing
-            else "substeps = 1",
-            "h = width / substeps",
-            "for substep in range(substeps):",
-            *(f"    {line}" for line in inner),
-        ]
+    call = partial(_call, element)
+    inner = [
+        "at = substep / substeps", *call("at", 1, s, "0.0"),
+        "at = (substep + 0.5) / substeps",
+        *call("at", 2, moved("0.5 * h", 1), "0.5 * h"), *call("at", 3, moved("0.5 * h", 2), "0.5 * h"),
+        "at = (substep + 1.0) / substeps", *call("at", 4, moved("h", 3), "h"),
+        *(f"{n} = {n} + h / 6.0 * (a1_{i} + 2.0 * (a2_{i} + a3_{i}) + a4_{i})" for i, n in enumerate(s[:flowing])),
+    ] if flowing else ["at = 1.0"]  # fmt: skip
+    if element.memories:
+        inner += [*call("at", 1, s, "h"), *(f"s{i} = a1_{i}" for i in range(flowing, len(s)))]
+    number = "max(1, int(math.ceil(width / max_step * (1.0 - 1e-9))))" if flowing else "1"
+    return [
+        f"substeps = {number}",
+        "h = width / substeps",
+        "for substep in range(substeps):",
+        *(f"    {line}" for line in inner),
+    ]
+
+
+def _module(element: Element) -> Module:
+    kernel, rows = kernel_module(element), _rows(element)
+    s = [f"s{i}" for i in range(len(element.own))]
+    plain = "value - leg" if element.acts == "modifier" else "value"
+    change = plain if element.slot == "force" else "value - z"
     lines = [
-        "begin = time[k - 1]; width = time[k] - time[k - 1]",
-        *(f"{name}0 = path[{i}, k - 1]; {name}1 = path[{i}, k]" for i, name in enumerate(rows)),
-        *body,
-        *call("1.0", 1, s, "0.0"),
-        f"out[k] = {change}",
+        '"""Generated by rhythmid: one element along a given trajectory."""',
+        "import math",
+        "",
+        "from numba import njit",
+        f"from {kernel.name} import {element.name} as kernel",
+        "",
+        '@njit("void(float64[::1], float64[:, ::1], float64[::1], float64[::1], float64, float64[::1])",',
+        '      cache=True, nogil=True, error_model="numpy")',
+        "def run(time, path, parameters, states, max_step, out):",
+        *(f"    p{i} = parameters[{i}]" for i in range(len(element.parameters) + len(element.borrows))),
+        *(["    yielding = 0.0"] if element.acts == "constraint" else []),
+        *(f"    {name} = states[{i}]" for i, name in enumerate(s)),
+        "    begin = time[0]; width = 0.0",
+        *(f"    {name}0 = path[{i}, 0]; {name}1 = path[{i}, 0]" for i, name in enumerate(rows)),
+        *(f"    {line}" for line in _call(element, "0.0", 1, s, "0.0")),
+        f"    out[0] = {change}",
+        "    for k in range(1, time.shape[0]):",
+        "        begin = time[k - 1]; width = time[k] - time[k - 1]",
+        *(f"        {name}0 = path[{i}, k - 1]; {name}1 = path[{i}, k]" for i, name in enumerate(rows)),
+        *(f"        {line}" for line in [*_steps(element), *_call(element, "1.0", 1, s, "0.0")]),
+        f"        out[k] = {change}",
+        "",
     ]
-    start = [
-        "begin = time[0]; width = 0.0",
-        *(f"{name}0 = path[{i}, 0]; {name}1 = path[{i}, 0]" for i, name in enumerate(rows)),
-        *call("0.0", 1, s, "0.0"),
-        f"out[0] = {change}",
-    ]
-    kernel = kernel_module(element)
-    text = "\n".join(
-        [
-            '"""Generated by rhythmid: one element along a given trajectory."""',
-            "import math",
-            "",
-            "from numba import njit",
-            f"from {kernel.name} import {element.name} as kernel",
-            "",
-            '@njit("void(float64[::1], float64[:, ::1], float64[::1], float64[::1], float64, float64[::1])",',
-            '      cache=True, nogil=True, error_model="numpy")',
-            "def run(time, path, parameters, states, max_step, out):",
-            *(f"    {name} = parameters[{i}]" for i, name in enumerate(p)),
-            *(["    yielding = 0.0"] if element.acts == "constraint" else []),
-            *(f"    {name} = states[{i}]" for i, name in enumerate(s)),
-            *(f"    {line}" for line in start),
-            "    for k in range(1, time.shape[0]):",
-            *(f"        {line}" for line in lines),
-            "",
-        ]
-    )
-    return Module(text, (kernel,))
+    return Module("\n".join(lines), (kernel,))
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,13 +21,8 @@ from rhythmid.errors import InputError
 
 _LOCK = threading.Lock()
 COLOUR = re.compile(r"\x1b\[[0-9;]*m")  # the compiler uses colours where it can
-OURS = {
-    "rhs",
-    "run",
-    "piece_at",
-    "value_at",
-    "slope_at",
-}  # functions of generated modules that are no kernels
+# functions of generated modules that are no kernels
+OURS = {"rhs", "run", "piece_at", "value_at", "slope_at"}
 
 
 def cache_folder() -> Path:

@@ -30,19 +30,13 @@ from rhythmid.twin.settings import Settings
 Array = NDArray[np.float64]
 SEGMENT = 0.2  # [s]
 BLOCKS = 4  # minimum number of blocks in a segment
-KICKS = (
-    1e-5,
-    1e-4,
-    1e-3,
-    1e-2,
-    1e-1,
-)  # candidate random changes of speed in a segment, relative to the usual speed
+# candidate random changes of speed in a segment, relative to the usual speed
+KICKS = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 TUNED = 60  # segments for tuning the random forces
 PASSES = 3  # largest number of passes for each candidate
 FORCE_PASSES = 3  # passes for the constant force, each with a filter tuned to the remainder
-CONVERGED_VARIANCE_CHANGE = (
-    0.1  # relative change of the noise's variance from pass to pass that counts as converged
-)
+# relative change of the noise's variance from pass to pass that counts as converged
+CONVERGED_VARIANCE_CHANGE = 0.1
 SETTLED = 15  # segments until the initial state is forgotten: three seconds of the minute
 ROUGH = 3  # order of differences that keep the measurement's noise and remove its motion
 LEAST_NOISE_SHARE = 1e-9  # smallest noise as a share of the motion; no sensor is better

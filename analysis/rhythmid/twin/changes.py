@@ -4,16 +4,15 @@ from dataclasses import dataclass
 
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.model import INERTIA, Model
-from rhythmid.simulation.generated_source import DRIVES, InputKind
+from rhythmid.simulation.right_hand_side import DRIVES, InputKind
 
 DELAYS = ("input_delay.delay", "measurement_delay.delay")
 GAINED = (  # one effect of each kind that a slot of the signal path may gain
     "input_delay", "actuator_gain", "coulomb_friction", "viscous_damper", "constant_force", "measurement_delay",
     "sensor_gain", "sensor_offset",
 )  # fmt: skip
-SAME = {
-    "viscous_damper": ("switched_damper",)
-}  # elements of the model with a parameter that already does the same
+# elements of the model with a parameter that already does the same
+SAME = {"viscous_damper": ("switched_damper",)}
 SHARP = 0.05  # share of the usual speed over which the sign of an added friction changes
 INERTIA_SLOT = "inertia"
 

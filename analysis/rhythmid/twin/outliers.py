@@ -12,9 +12,8 @@ from rhythmid.twin.samples import Samples
 
 Array = NDArray[np.float64]
 CHUNK = 0.1  # [s] of samples judged together: half a segment
-BEFORE = (
-    1000  # earlier samples that tell how rough the signal usually is, and what share of it stands far off
-)
+# earlier samples that tell how rough the signal usually is, and what share of it stands far off
+BEFORE = 1000
 AFTER = WIDEST + 2  # later samples: the end of the widest outlier, and two good samples beyond it
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import NO_HISTORY, compile_model
-from rhythmid.simulation.generated_source import Variant
+from rhythmid.simulation.right_hand_side import Variant
 from rhythmid.simulation.signal import FAR, continuous, pieces
 from rhythmid.simulation.transport import command_delay, physical_times
 from rhythmid.twin.changes import Change
@@ -17,9 +17,8 @@ from rhythmid.twin.settings import Settings
 Array = NDArray[np.float64]
 Pieces = tuple[Array, Array]
 DIFFERENCE_STEP_SHARE = 1e-3  # finite-difference step of a state or parameter, relative to its scale
-DELAY_STEP = (
-    2e-4  # [s] the same for a delay: below the sample period of most machines, above the rounding of times
-)
+# [s] the same for a delay: below the sample period of most machines, above the rounding of times
+DELAY_STEP = 2e-4
 MARGIN = 4  # samples on either side of a segment that are used for a spline through a smooth signal
 LONGEST_STEP = 2e-3  # [s] largest integration step: a hundredth of a period of 5 Hz
 DIVERGED = 1e100

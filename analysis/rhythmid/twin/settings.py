@@ -4,12 +4,11 @@ from dataclasses import dataclass
 
 from rhythmid.errors import InputError
 from rhythmid.record.record import Record
-from rhythmid.simulation.generated_source import DRIVES, InputKind, OutputKind
+from rhythmid.simulation.right_hand_side import DRIVES, InputKind, OutputKind
 from rhythmid.simulation.signal import Hold
 
-SHORTEST_HEALTHY = (
-    20.0  # [s]; four of the longest window, below which the scatter of its statistic is not known
-)
+# [s]; four of the longest window, below which the scatter of its statistic is not known
+SHORTEST_HEALTHY = 20.0
 
 
 @dataclass(frozen=True)

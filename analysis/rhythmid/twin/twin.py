@@ -29,9 +29,8 @@ Array = NDArray[np.float64]
 Level = Literal["learning", "late", "ok", "warn", "error"]
 Role = Literal["input", "output", "forcing", "released"]
 CONFIRMED = 10.0  # [s] of mismatch after which a warning becomes an error
-PATIENCE = (
-    1.0  # [s] by which commands and forcing may be older than the measurement before they are taken as held
-)
+# [s] by which commands and forcing may be older than the measurement before they are taken as held
+PATIENCE = 1.0
 
 
 @dataclass(frozen=True)

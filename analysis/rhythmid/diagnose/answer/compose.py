@@ -89,69 +89,40 @@ def explanations(contest: Contest, decision: Decision) -> tuple[Explanation, ...
 def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosis:
     """The diagnosis."""
     found, decision, contest = result.search, result.decision, result.contest
-    series = found.fit.run.series
-    repeats = noise_from_repeats(series)
-    best = found.best
-    fit = found.fit
-    sizes = scales(series, fit.model)
-    missing = missing_effects(fit.model, decision, lambda name: estimated(fit, name), sizes)
-    plain = FitQuality(found.nominal.nrmse(), contest.nominal.heldout_nrmse)
-    augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
-    groups = _indistinguishable(found.fit.model, decision)
-    rivals = [one for one in found.trials if _rivals(one, best, groups)]
-    if decision.beside and not any(one.key != best.key for one in rivals):
-        rivals = [one for one in found.trials if _without(one, best, decision.beside)]
-    case.tell("choosing the next experiment")
-    freed = freed_value(case.nominal, fit.model, result.selection.chosen)
-    if INPUT_DELAY in fit.names:
-        freed = freed or longer_delay(fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY], decision)
-    settles = settled(decision.verdict, groups, bool(decision.beside)) or decision.rule == LONGER_DELAY
-    needed = decision.verdict != "consistent" and not settles
-    heldout = {one.key: one.heldout_nrmse for one in contest.hypotheses}
-    alternatives = tuple(
-        Alternative(t.names, t.bic() - best.bic(), heldout.get(t.key))
-        for t in [t for t in found.trials if t.key != best.key][:SHOWN]
+    fit, chosen = found.fit, result.selection.chosen
+    series = fit.run.series
+    missing = missing_effects(
+        fit.model, decision, lambda name: estimated(fit, name), scales(series, fit.model)
     )
+    plain = FitQuality(found.nominal.nrmse(), contest.nominal.heldout_nrmse)
+    augmented = FitQuality(fit.nrmse(), chosen.heldout_nrmse)
+    groups = _indistinguishable(fit.model, decision)
+    case.tell("choosing the next experiment")
     part = "record" if result.scoring.kind == "free_run" else "window"
     drawn = {one.quantity: (one.grid, one.force) for one in result.after}
     return Diagnosis(
         verdict=decision.verdict,
-        summary=summary_of(
-            decision,
-            missing,
-            plain,
-            augmented,
-            "motion",
-            freed,
-        ),
+        summary=summary_of(decision, missing, plain, augmented, "motion", _freed(case.nominal, result)),
         detection=Detection(
             found.rounds[0].p_value,
             _nominal_error(case.nominal, found.nominal, found.noise),
             plain.train_nrmse,
-            _floor(series, [found.noise, *([repeats] if repeats is not None else [])]),
+            _floor(series, found.noise),
         ),
         location=_location(found, missing, result.before, decision.verdict),
         missing=missing,
         joint_probability=decision.joint,
         indistinguishable=groups,
-        alternatives=alternatives,
+        alternatives=_alternatives(found, contest),
         hypotheses=explanations(contest, decision),
         rejections=result.selection.rejections,
         remainder=remainder_of(decision, drawn),
         fit={"refitted_nominal": plain, "augmented": augmented},
         parameters={name: estimated(fit, name) for name in fit.model.parameters},
         delays=delays_of(fit),
-        next_experiment=(
-            MORE_TIME if case.budget.passed(EXPLAINED) else next_experiment(found, rivals, series, needed)
-        ),
+        next_experiment=MORE_TIME if case.budget.passed(EXPLAINED) else _next(found, decision, groups),
         scoring=Scored(result.scoring.kind, None, result.scoring.reason, series[0].block),
-        calibration=(
-            *result.calibration.notes,
-            *zeros_told(fit),
-            *scale_told(case.nominal, fit),
-            *recalibrated(case.nominal, fit.model, {name: fit.std[name] for name in fit.names}),
-            *_delay_told(case.nominal, fit),
-        ),
+        calibration=(*result.calibration.notes, *_recalibrated(case.nominal, fit)),
         excluded=found.excluded,
         heldout=held_out_words(case.holdout, f"the last fifth of every {part}"),
         notes=(
@@ -162,10 +133,30 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
                 fit, result.scoring.unseen if case.holdout and not case.budget.spent else ()
             ),
         ),
-        chosen=result.selection.chosen.elements,
+        chosen=chosen.elements,
         families=decision.families,
         assumptions=(ONE_CLOCK,) if any(one.commanded for one in series) else (),
     )
+
+
+def _alternatives(found: Search, contest: Contest) -> tuple[Alternative, ...]:
+    """The models that fit best, without the chosen one."""
+    heldout = {one.key: one.heldout_nrmse for one in contest.hypotheses}
+    others = [one for one in found.trials if one.key != found.best.key]
+    return tuple(
+        Alternative(one.names, one.bic() - found.best.bic(), heldout.get(one.key)) for one in others[:SHOWN]
+    )
+
+
+def _next(found: Search, decision: Decision, groups: tuple[tuple[str, ...], ...]) -> str:
+    """The experiment that separates the models that the records do not."""
+    best = found.best
+    rivals = [one for one in found.trials if _rivals(one, best, groups)]
+    if decision.beside and not any(one.key != best.key for one in rivals):
+        rivals = [one for one in found.trials if _without(one, best, decision.beside)]
+    settles = settled(decision.verdict, groups, bool(decision.beside)) or decision.rule == LONGER_DELAY
+    needed = decision.verdict != "consistent" and not settles
+    return next_experiment(found, rivals, found.fit.run.series, needed)
 
 
 def _location(
@@ -200,11 +191,22 @@ def _without(one: Trial, best: Trial, uncertain: Sequence[str]) -> bool:
     return bool(gone) and gone <= set(uncertain) and len(one.added) <= len(best.added)
 
 
-def _delay_told(nominal: Model, fit: Fit) -> tuple[str, ...]:
-    """The sentence about a delay that the nominal model does not have."""
+def _freed(nominal: Model, result: FreeRunResult) -> str | None:
+    """Sentences about the fixed value, or the delay, that the chosen hypothesis frees."""
+    fit = result.search.fit
+    freed = freed_value(nominal, fit.model, result.selection.chosen)
+    if freed or INPUT_DELAY not in fit.names:
+        return freed
+    return longer_delay(fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY], result.decision)
+
+
+def _recalibrated(nominal: Model, fit: Fit) -> tuple[str, ...]:
+    """Sentences about zeros, scales and nominal values that the records contradict, and a delay that the model lacks."""
+    values = recalibrated(nominal, fit.model, {name: fit.std[name] for name in fit.names})
+    told = (*zeros_told(fit), *scale_told(nominal, fit), *values)
     if INPUT_DELAY in nominal.parameters or INPUT_DELAY not in fit.names:
-        return ()
-    return unstated_delay(fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY])
+        return told
+    return (*told, *unstated_delay(fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY]))
 
 
 def _indistinguishable(model: Model, decision: Decision) -> tuple[tuple[str, ...], ...]:
@@ -280,9 +282,10 @@ def remainder_of(decision: Decision, drawn: Mapping[str, tuple[Array, Array]]) -
     return Remainder(left.share, left.significant, left.goes_with, curve)
 
 
-def _floor(series: Sequence[Series], noises: Sequence[NoiseModel]) -> float:
+def _floor(series: Sequence[Series], noise: NoiseModel) -> float:
     """Error due to noise alone. Repeats that still ring down overstate it, so that a good enough fit shows less."""
-    variance = min(noise.variance for noise in noises)
+    repeats = noise_from_repeats(series)
+    variance = noise.variance if repeats is None else min(noise.variance, repeats.variance)
     power = sum(one.power(one.used) for one in series) / max(sum(int(one.used.sum()) for one in series), 1)
     return math.sqrt(variance / max(power, 1e-300))
 

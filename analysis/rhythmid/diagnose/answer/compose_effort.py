@@ -4,14 +4,7 @@ import math
 from collections.abc import Sequence
 
 from rhythmid.diagnose.answer.compose import explanations, held_out_words, missing_effects, remainder_of
-from rhythmid.diagnose.answer.result import (
-    Detection,
-    Diagnosis,
-    Estimate,
-    FitQuality,
-    Scored,
-    settled,
-)
+from rhythmid.diagnose.answer.result import Detection, Diagnosis, Estimate, FitQuality, Scored, settled
 from rhythmid.diagnose.answer.same_while_moving import same_while_moving
 from rhythmid.diagnose.answer.varied_motion import motion_varying
 from rhythmid.diagnose.answer.wording import (

@@ -50,10 +50,7 @@ def words_of(elements: Iterable[Element]) -> dict[str, ElementWords]:
     """Descriptions of these elements in the catalogue, by name."""
     return {
         e.name: ElementWords(
-            e.title,
-            {p.name: p.description for p in e.parameters},
-            e.also_known_as,
-            e.reference,
+            e.title, {p.name: p.description for p in e.parameters}, e.also_known_as, e.reference
         )
         for e in elements
     }

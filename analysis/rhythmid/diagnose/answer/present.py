@@ -106,7 +106,7 @@ def findings(
     runs = free_runs(found.nominal, found.fit, seen, added, labels)
     if result.unseen_nominal is not None:
         after = result.unseen_augmented or result.unseen_nominal
-        repaired = bool(found.best.added) and result.unseen_augmented is not None
+        repaired = added and result.unseen_augmented is not None
         unseen = {record.name: pumpings[id(record)] for record in holdout}
         runs += free_runs(result.unseen_nominal, after, unseen, repaired, labels, heldout=True)
     models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": found.nominal.model.to_yaml()}
@@ -128,12 +128,9 @@ def findings(
         slow_noise=(repeats or noise_of(found.fit.residuals, found.fit.run.series)).long_run_variance ** 0.5,
         scores=_scores(found),
         threshold=float(chi2_distribution.isf(LEVEL / count, 1)),
-        functions=_functions(result.before, result.after if found.best.added else (), runs, nominal),
+        functions=_functions(result.before, result.after if added else (), runs, nominal),
         transfer=_transfer(
-            found,
-            [p for r in records if (p := pumpings[id(r)]) is not None],
-            result.calibration.series,
-            nominal,
+            found, [p for r in records if (p := pumpings[id(r)])], result.calibration.series, nominal
         ),
         nominal=given_values(nominal),
         refitted=_estimates(found.nominal),

@@ -80,68 +80,79 @@ def summary_of(
     `whole` is the quantity that errors are a share of. `freed` describes the value that the chosen hypothesis frees besides its
     effects: one that is fixed, or the delay. `noise_known`: whether the noise is known otherwise than as what the model leaves.
     """
-    names = listed([effect.element for effect in missing])
     value = "" if freed is None else _begun(freed)
-    if value and decision.verdict != "missing_physics":
+    if decision.verdict == "missing_physics":
+        return _lacking(decision, missing, plain, augmented, whole, value)
+    if value:
         return f"{_agreed(decision)}{value}"
     if decision.verdict == "consistent":
-        said = "Nothing of practical size is missing: with its parameters refitted, the nominal model explains the records"
-        left = decision.unexplained
-        if noise_known and not left.significant:
-            return f"{said} down to the noise."
-        error = plain.train_nrmse if plain.heldout_nrmse is None else plain.heldout_nrmse
-        small = f"{number(100.0 * error, 2)} % of the {whole}"
-        if left.significant:
-            return f"{said} but for {small}, part of which depends on {left.goes_with}."
-        return f"{said} but for {small}, in which no test finds a cause."
-    if decision.verdict == "missing_physics":
-        said = f"The model lacks {names}."
-        if decision.equivalent:
-            said += f" {_alike(decision)}"
-        before, after = plain.heldout_nrmse, augmented.heldout_nrmse
-        if before is not None and after is not None:
-            beside = listed(decision.beside)
-            if beside:
-                verb = "is" if len(decision.beside) == 1 else "are"
-                beside = f" and {beside}, which {verb} too uncertain to be named"
-            said += (
-                f" With {'it' if len(missing) == 1 else 'them'}{beside}, the error on held-out data falls from {100 * before:.2f} % to "
-                f"{100 * after:.2f} % of the {whole}."
-            )
-        left = decision.unexplained
-        if left.significant and left.share > 0.0:
-            said += (
-                f" {number(100.0 * left.share, 2)} % of the mismatch is left and depends on {left.goes_with}."
-            )
-        families = _some_form_of(decision, [effect.element for effect in missing])
-        return f"{said} {value}".strip() + (f" {families}, too; the law is undecided." if families else "")
+        return _nothing_missing(decision, plain, whole, noise_known)
     if decision.verdict == "undecided":
-        families = _some_form_of(decision)
-        said = (
-            f"{families}, but the law is undecided: {decision.reason}."
-            if families
-            else f"{_begun(decision.reason)}."
-        )
-        of_main = bool(decision.equivalent) and (
-            not missing or decision.equivalent[0][0] == missing[0].element
-        )
-        if of_main and decision.rule == "rivals":
-            groups = "; and ".join(listed(group, "or") for group in decision.equivalent)
-            open_ = {name for group in decision.equivalent for name in group}
-            others = listed([one.element for one in missing if one.element not in open_])
-            return f"{said} They are {groups}{f', each beside {others}' if others else ''}."
-        main = (
-            f", of which {in_words(missing[0].element)} explains {missing[0].share:.0%} of the mismatch"
-            if len(missing) > 1
-            else ""
-        )
-        said += f" Best so far: {names}{main}." if names else ""
-        return said + (f" {_alike(decision)}" if decision.equivalent else "")
+        return _undecided(decision, missing)
+    nearest = f" The nearest known {'effect does' if len(missing) == 1 else 'effects do'} not explain it: {_names(missing)}."
     return f"Something is missing that the catalogue does not know: {decision.reason}." + (
-        f" The nearest known {'effect does' if len(missing) == 1 else 'effects do'} not explain it: {names}."
-        if names
+        nearest if missing else ""
+    )
+
+
+def _names(missing: Sequence[MissingEffect]) -> str:
+    return listed([effect.element for effect in missing])
+
+
+def _nothing_missing(decision: Decision, plain: FitQuality, whole: str, noise_known: bool) -> str:
+    said = "Nothing of practical size is missing: with its parameters refitted, the nominal model explains the records"
+    left = decision.unexplained
+    if noise_known and not left.significant:
+        return f"{said} down to the noise."
+    error = plain.train_nrmse if plain.heldout_nrmse is None else plain.heldout_nrmse
+    small = f"{number(100.0 * error, 2)} % of the {whole}"
+    if left.significant:
+        return f"{said} but for {small}, part of which depends on {left.goes_with}."
+    return f"{said} but for {small}, in which no test finds a cause."
+
+
+def _lacking(
+    decision: Decision, missing: Sequence[MissingEffect], plain: FitQuality, augmented: FitQuality,
+    whole: str, value: str,
+) -> str:  # fmt: skip
+    said = f"The model lacks {_names(missing)}."
+    if decision.equivalent:
+        said += f" {_alike(decision)}"
+    before, after = plain.heldout_nrmse, augmented.heldout_nrmse
+    if before is not None and after is not None:
+        beside = listed(decision.beside)
+        if beside:
+            verb = "is" if len(decision.beside) == 1 else "are"
+            beside = f" and {beside}, which {verb} too uncertain to be named"
+        said += (
+            f" With {'it' if len(missing) == 1 else 'them'}{beside}, the error on held-out data falls from {100 * before:.2f} % to "
+            f"{100 * after:.2f} % of the {whole}."
+        )
+    left = decision.unexplained
+    if left.significant and left.share > 0.0:
+        said += f" {number(100.0 * left.share, 2)} % of the mismatch is left and depends on {left.goes_with}."
+    families = _some_form_of(decision, [effect.element for effect in missing])
+    return f"{said} {value}".strip() + (f" {families}, too; the law is undecided." if families else "")
+
+
+def _undecided(decision: Decision, missing: Sequence[MissingEffect]) -> str:
+    families = _some_form_of(decision)
+    law = f"{families}, but the law is undecided: {decision.reason}."
+    said = law if families else f"{_begun(decision.reason)}."
+    groups = decision.equivalent
+    of_main = bool(groups) and (not missing or groups[0][0] == missing[0].element)
+    if of_main and decision.rule == "rivals":
+        open_ = {name for group in groups for name in group}
+        others = listed([one.element for one in missing if one.element not in open_])
+        rivals = "; and ".join(listed(group, "or") for group in groups)
+        return f"{said} They are {rivals}{f', each beside {others}' if others else ''}."
+    main = (
+        f", of which {in_words(missing[0].element)} explains {missing[0].share:.0%} of the mismatch"
+        if len(missing) > 1
         else ""
     )
+    said += f" Best so far: {_names(missing)}{main}." if missing else ""
+    return said + (f" {_alike(decision)}" if groups else "")
 
 
 def listed(names: Sequence[str], word: str = "and") -> str:
@@ -165,9 +176,8 @@ def freed_value(nominal: Model, fitted: Model, chosen: Hypothesis) -> str | None
         for name, held in ((name, nominal.parameters[name]) for name in freed)
     ]
     what = "that value" if len(freed) == 1 else "these values"
-    file = any(
-        name.startswith(f"{BODY}.") for name in freed
-    )  # the file of a body does not mark free parameters
+    # the file of a body does not mark free parameters
+    file = any(name.startswith(f"{BODY}.") for name in freed)
     return (
         f"{'. '.join(values)}, and that{beside} predicts the records better than any effect does while it is held: check {what}"
         f"{'' if file else ', or drop its ' + repr('fixed: true')}."

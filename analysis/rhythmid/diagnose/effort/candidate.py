@@ -109,15 +109,9 @@ def fixed_values(balance: Balance, model: Model) -> list[str]:
     size: there masses that are freed one after another make all of them vanish, and links are left to the joints that are driven.
     """
     links = balance.motions[0].links
-    freed = {
-        n
-        for n, value in model.parameters.items()
-        if value.fixed and (value.value != 0.0 or n in links) and n != INERTIA
-        and not (balance.undriven and n in links)
-    }  # fmt: skip
-    forms = {f"{t.label}.{p.name}" for t in model.terms for p in t.element.parameters if p.fixed}
-    open_model = with_freed(model, freed - forms)
-    names = [name for name in balance.estimated(open_model) if name in freed - forms]
+    meant = (n for n in model.held if (not balance.undriven if n in links else model.value(n) != 0.0))
+    freed = {name for name in meant if name != INERTIA}
+    names = [name for name in balance.estimated(with_freed(model, freed)) if name in freed]
     if model.mass.fixed and not any(motion.driven_by_base for motion in balance.motions):
         names.insert(0, INERTIA)
     return names

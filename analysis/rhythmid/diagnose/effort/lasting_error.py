@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 PAST = 8  # past errors that predict the next one: two periods of the filter's cut-off, at 2.5 rows a period and more
-HALVES = 2  # halves of each record; each is predicted with the coefficients of the other
 LEAST_ROWS = 4 * PAST  # minimum rows of a record
 
 
@@ -36,13 +35,12 @@ def lasting_share(error: Array, record: NDArray[np.int64], memory: int) -> float
         later = one[PAST + memory - 1 :]
         past.append(windows)
         now.append(later)
-        fold.append(np.arange(len(later)) * HALVES // len(later))
+        fold.append(2 * np.arange(len(later)) // len(later))
     if not now:
         return 0.0
     x, y, of = np.vstack(past), np.concatenate(now), np.concatenate(fold)
     left = 0.0
-    for number in range(HALVES):
-        out = of == number
+    for out in (of == 0, of == 1):
         coefficients = np.linalg.lstsq(x[~out], y[~out], rcond=None)[0]
         left += float(np.sum((y[out] - x[out] @ coefficients) ** 2))
     whole = float(y @ y)

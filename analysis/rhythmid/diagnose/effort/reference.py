@@ -1,6 +1,6 @@
 """Unknown physics as a competing model: a free function of the motion beside the model's own elements."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.evidence import Blocks, Linearised, predict
+from rhythmid.diagnose.hypothesis import Prediction
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import linearise, size_of
 from rhythmid.identify.inverse_dynamics.free_map import FreeMap
@@ -20,9 +21,8 @@ Array = NDArray[np.float64]
 # differences of a spline's coefficients, or values of a function of the motion and its past. The smallest leaves straight
 # lines, the largest a tenth of the effort for every piece
 RIDGES = (0.3, 0.1, 0.03, 0.01, 0.003)
-STRAIGHT = (
-    3.0  # standard deviation of the straight part, in the same unit: a line may carry all of the effort
-)
+# standard deviation of the straight part, in the same unit: a line may carry all of the effort
+STRAIGHT = 3.0
 PASSES = 8  # iterations of reweighted least squares
 HISTORY = "the motion and its past"  # the quantity of a map of several quantities and their past
 
@@ -96,6 +96,22 @@ def history_of(balance: Balance, fitted: Fitted, blocks: Blocks) -> Mapped:
     """A fit with a free function of the motion and its past."""
     loads = balance.required(fitted.fit.model)
     return _best(balance, fitted, blocks, HistoryMap(balance.motions, balance.places, loads))
+
+
+def beyond_noise(mapped: Prediction, plain: Prediction, noise: float) -> Prediction:
+    """The prediction of a fit with a free map, as far as it is better than the fit without by more than `noise`.
+
+    `noise` is the mean square of the motion's noise in the effort, which the map may predict; see `noise_power`.
+    """
+    gain = plain.mean_square - mapped.mean_square
+    if gain <= 0.0:
+        return mapped
+    real = max(1.0 - noise / gain, 0.0)
+    return replace(
+        mapped,
+        log_density=plain.log_density + real * (mapped.log_density - plain.log_density),
+        squared_error=plain.squared_error + real * (mapped.squared_error - plain.squared_error),
+    )
 
 
 def _best(balance: Balance, fitted: Fitted, blocks: Blocks, free: Map) -> Mapped:

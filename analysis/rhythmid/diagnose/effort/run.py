@@ -1,6 +1,6 @@
 """Diagnosis by the recorded effort: the search, the evaluation on data that no fit has seen, and the decision."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -17,6 +17,7 @@ from rhythmid.diagnose.effort.lasting_error import lasting_share
 from rhythmid.diagnose.effort.reference import (
     HISTORY,
     Mapped,
+    beyond_noise,
     history_of,
     map_columns,
     reference_of,
@@ -46,6 +47,7 @@ from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import size_of, variation_of
 from rhythmid.identify.inverse_dynamics.free_map import FreeMap
+from rhythmid.identify.inverse_dynamics.motion_noise import noise_power
 from rhythmid.identify.robust_covariance import root_weights, weighted, with_robust_std
 
 Array = NDArray[np.float64]
@@ -82,11 +84,7 @@ class _Rows:
     blocks: Blocks
     heldout: Balance | None
 
-    def predicted(
-        self,
-        fitted: Fitted,
-        mapped: Mapped | None = None,
-    ) -> CrossValidated:
+    def predicted(self, fitted: Fitted, mapped: Mapped | None = None) -> CrossValidated:
         """Prediction errors of a fit, or of the same fit with a free map beside its parameters."""
         seen = fitted.linearised if mapped is None else mapped.linearised
         if self.heldout is None:
@@ -105,11 +103,10 @@ class _Rows:
             Linearised(residual, jacobian, seen.precision, seen.departure, rests), self.blocks
         )
 
-    @property
-    def judged(self) -> NDArray[np.bool_]:
-        """Rows of held-out records; without any, all rows, each predicted by the fit that did not see it."""
+    def rms(self, found: CrossValidated) -> float:
+        """Rms error on held-out records; without any, on all rows, each predicted by the fit that did not see it."""
         seen = self.blocks.seen_rows
-        return seen if seen.all() else ~seen
+        return float(np.sqrt(np.mean(found.error[seen if seen.all() else ~seen] ** 2)))
 
 
 def _rows(case: Case, found: EffortSearch, heldout: Balance | None) -> _Rows:
@@ -153,37 +150,25 @@ def effort_run(
             promising,
         )  # fmt: skip
     case.tell("weighing the hypotheses on data that no fit has seen")
-    rows = _rows(case, found, unseen)
-    size = variation_of(found.balance)
+    rows, size = _rows(case, found, unseen), variation_of(found.balance)
     predicted = {one.elements: rows.predicted(one) for one in found.hypotheses}
     ruled_out = {one.elements: rows.predicted(one) for one in found.ruled_out}
     left = remainder_of(found.balance, found.chosen)
-    of_the_motion = next(curve.quantity for curve in left if curve.joint is None)
-    mapped = {of_the_motion: rows.predicted(found.chosen, found.beyond)}
-    if places == 1:  # with several joints the effort depends on more than the joint's own motion
-        history = history_of(found.balance, found.chosen, found.blocks)
-        mapped[HISTORY] = rows.predicted(found.chosen, history)
-    if (beside := left[0].joint) is not None:
-        coupled = reference_of(found.balance, found.chosen, found.blocks, beside)
-        mapped[left[0].quantity] = rows.predicted(found.chosen, coupled)
+    mapped = _with_maps(found, rows, left, history=places == 1)
     time = time_of_best([*predicted.values(), *mapped.values()], rows.record)
-
-    def made(found: Mapping[K, CrossValidated]) -> dict[K, Prediction]:
-        each = with_trusted_rests([prediction(one, rows.blocks, time) for one in found.values()], rows.blocks)
-        return dict(zip(found, each, strict=True))
-
-    weighed = made(ruled_out) | made(predicted)
-    errors = {
-        tuple(sorted(elements)): float(np.sqrt(np.mean(one.error[rows.judged] ** 2)))
-        for elements, one in (ruled_out | predicted).items()
-    }
+    weighed = _weighed(ruled_out, rows.blocks, time) | _weighed(predicted, rows.blocks, time)
+    errors = {tuple(sorted(key)): rows.rms(one) for key, one in (ruled_out | predicted).items()}
+    maps = _weighed(mapped, rows.blocks, time)
+    if places == 1:  # a joint's motion is measured together with those of others
+        noise = noise_power(found.balance, case.records, found.chosen.fit.model)
+        maps = {of: beyond_noise(one, weighed[found.chosen.elements], noise) for of, one in maps.items()}
 
     def claimed(one: Fitted) -> Hypothesis:
         return one.claimed(weighed[one.elements], errors[one.key] / size)
 
     contest = Contest(
         tuple(claimed(one) for one in found.hypotheses),
-        made(mapped),
+        maps,
         places * found.candidates,
         size,
         PRACTICAL_EFFORT,
@@ -213,6 +198,27 @@ def effort_run(
         left if chosen is found.chosen else remainder_of(found.balance, chosen),
         errors,
     )
+
+
+def _with_maps(
+    found: EffortSearch, rows: _Rows, left: Sequence[Curve], history: bool
+) -> dict[str, CrossValidated]:
+    """Prediction errors of the chosen model with free maps, by the quantity that they depend on.
+
+    With several joints the effort depends on more than the `history` of the joint's own motion.
+    """
+    of_the_motion = next(curve.quantity for curve in left if curve.joint is None)
+    maps = {of_the_motion: found.beyond}
+    if history:
+        maps[HISTORY] = history_of(found.balance, found.chosen, found.blocks)
+    if (beside := left[0].joint) is not None:
+        maps[left[0].quantity] = reference_of(found.balance, found.chosen, found.blocks, beside)
+    return {quantity: rows.predicted(found.chosen, one) for quantity, one in maps.items()}
+
+
+def _weighed(found: Mapping[K, CrossValidated], blocks: Blocks, time: float) -> dict[K, Prediction]:
+    each = with_trusted_rests([prediction(one, blocks, time) for one in found.values()], blocks)
+    return dict(zip(found, each, strict=True))
 
 
 def _among_models(

@@ -134,7 +134,7 @@ def search_effort(
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Search:
     """The state of a search; `found` holds all hypotheses fitted so far."""
 

@@ -338,16 +338,15 @@ def _ranked(task: _Task, state: _State) -> tuple[Trial, NoiseModel, list[Trial]]
     """The best model when all are compared under the noise that it leaves, that noise model, and all models, best first."""
     best, noise, step = state.best, state.noise, task.step
     ranked = _contenders(state.trials, best)
-    for _ in range(OVERTAKEN):
+    for turn in range(OVERTAKEN + 1):
         ranked = near_under_noise(ranked, task.series, noise, step, NEAR)
         best = next(one for one in ranked if one.key == best.key)
         ahead = state.margin if ranked[0].free > best.free else WORTH
-        if ranked[0].bic() >= best.bic() - ahead or not ranked[0].added:
-            return best, noise, ranked
+        if turn == OVERTAKEN or ranked[0].bic() >= best.bic() - ahead or not ranked[0].added:
+            break
         best = ranked[0]  # a model rejected under an earlier noise model is now better than the chosen one
         noise = task.noise_left(best, noise)
-    ranked = near_under_noise(ranked, task.series, noise, step, NEAR)
-    return next(one for one in ranked if one.key == best.key), noise, ranked
+    return best, noise, ranked
 
 
 def _most_likely(
@@ -376,9 +375,8 @@ def _could_pay(state: _State) -> bool:
     now, series, noise = state.rounds[-1], state.current.run.series, state.current.noise
     if now.chance >= LEVEL or state.current.nrmse() ** 2 < UNDERSTATED * PRACTICAL**2:
         return False
-    power = sum(
-        one.power(one.used) for one in series
-    )  # number of samples times the mean square of the motion
+    # number of samples times the mean square of the motion
+    power = sum(one.power(one.used) for one in series)
     practical = PRACTICAL**2 * power / max(noise.variance, noise.long_run_variance)
     earned = 0.5 * (state.margin + math.log(max(state.best.samples, 2)))
     return now.strongest > max(earned, UNDERSTATED * practical)

@@ -35,7 +35,7 @@ from rhythmid.identify.record_scales import scales
 from rhythmid.model import Model
 from rhythmid.parallel import each
 from rhythmid.simulation.effect import Path, effect_along, past_modifiers
-from rhythmid.simulation.generated_source import DRIVES
+from rhythmid.simulation.right_hand_side import DRIVES
 from rhythmid.simulation.signal import first_order_hold, is_held
 from rhythmid.simulation.transport import delayed_command, delays, physical_times
 

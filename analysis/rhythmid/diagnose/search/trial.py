@@ -31,9 +31,8 @@ class Trial:
     free: int
     converged: bool
     noise: NoiseModel  # noise model of chi2
-    differences: tuple[Array, Array] | None = (
-        None  # difference steps of its sensitivities, for parameters and for states
-    )
+    # difference steps of its sensitivities, for parameters and for states
+    differences: tuple[Array, Array] | None = None
     start_cost: float = 0.0  # cost of the free initial states of its elements
 
     @property

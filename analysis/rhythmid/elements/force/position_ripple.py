@@ -16,9 +16,8 @@ def kernel(x, v, t, f, amplitude, wavelength, phase):
 
 
 def starts(scales):
-    wavelengths = [
-        2.0 * scales.position / 1.18**k for k in range(12)
-    ]  # from two periods in the usual travel to a dozen
+    # from two periods in the usual travel to a dozen
+    wavelengths = [2.0 * scales.position / 1.18**k for k in range(12)]
     return [
         {"amplitude": 0.01 * scales.force, "wavelength": wavelength, "phase": phase}
         for wavelength in (*scales.residual_wavelengths, *wavelengths)

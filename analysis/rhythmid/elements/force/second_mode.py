@@ -33,11 +33,8 @@ RATIOS = (
 )  # ratios of the mode's frequency to that of the mass on its spring
 DAMPING_RATIOS = (0.1, 0.01)  # of a joint or a payload, and of a metal structure
 SHARE = 0.03  # of the first mass
-FACTORS_OF_LINE = (
-    1.0,
-    0.97,
-    1.03,
-)  # ratios to the strongest remaining line: the mode is next to the line that it causes
+# ratios to the strongest remaining line: the mode is next to the line that it causes
+FACTORS_OF_LINE = (1.0, 0.97, 1.03)
 
 
 def starts(scales):

@@ -16,7 +16,7 @@ from rhythmid.identify.inverse_dynamics.rests import told
 from rhythmid.model import INERTIA, Model
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import Path, effect_along
-from rhythmid.simulation.generated_source import OutputKind
+from rhythmid.simulation.right_hand_side import OutputKind
 
 # condition number of the scaled regressor above which a robot's parameters are not sufficiently excited (K.
 # Schröer, in: Robot Calibration, Chapman & Hall, 1993; M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 aim

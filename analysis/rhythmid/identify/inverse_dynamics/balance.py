@@ -319,9 +319,8 @@ class Balance:
             for term in reversed([t for t in model.terms if t.element.slot == slot]):
                 if self._counts(term, model):
                     required = self._before(motion, term, model, required, leg, by)
-        if (
-            self.by_reference
-        ):  # the command path's effect is on this side, so that the rows stay the same for all models
+        # the command path's effect is on this side, so that the rows stay the same for all models
+        if self.by_reference:
             required = required + motion.effort - self._asked(index, model, self.shift(model))
         return required
 
@@ -365,12 +364,7 @@ class Balance:
     def _force(self, index: int, term: Term, model: Model) -> Array:
         """Force (n,) of an element that depends only on the motion. Cached: most refits change one element."""
         borrowed = tuple(model.borrowed(source, default) for source, default in term.element.borrows.values())
-        key = (
-            index,
-            term.element.name,
-            tuple((name, v.value) for name, v in term.values.items()),
-            borrowed,
-        )
+        key = (index, term.element.name, tuple((name, v.value) for name, v in term.values.items()), borrowed)
         found = self._forces.get(key)
         if found is None:
             zero = np.zeros(len(self.motions[index].time))

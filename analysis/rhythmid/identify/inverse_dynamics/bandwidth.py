@@ -135,10 +135,9 @@ def _of_motion(raw: Stretch) -> tuple[float, float]:
     what drives the machine has more power beyond the gap, above `ABOVE` times the floor, than it lacks within. A vibration of the structure
     that nothing recorded drives is no part of it.
     """
-    length = max(min(len(raw.output), 64), len(raw.output) // SEGMENTS)
     rate = 1.0 / raw.period
-    frequency, power = welch(raw.output - raw.output.mean(), rate, nperseg=length, detrend="linear")
-    floor = float(np.median(power[len(power) // 2 :]))
+    frequency, power, floor = _spectrum(raw)
+    length = _segment(raw)
     peak = 1 + int(np.argmax(power[1:]))
     below = np.flatnonzero(power[peak:] < ABOVE * floor)
     last = peak + int(below[0]) if len(below) else len(power) - 1
@@ -154,6 +153,25 @@ def _of_motion(raw: Stretch) -> tuple[float, float]:
     whole = np.abs(np.fft.rfft(detrend(raw.output) * np.hanning(len(raw.output))))
     strongest = (1 + int(np.argmax(whole[1:]))) * rate / len(raw.output)
     return min(float(frequency[last]), HIGHEST_DERIVED_SHARE * rate), float(strongest)
+
+
+def _segment(raw: Stretch) -> int:
+    """Samples of a segment of the spectra."""
+    return max(min(len(raw.output), 64), len(raw.output) // SEGMENTS)
+
+
+def _spectrum(raw: Stretch) -> tuple[Array, Array, float]:
+    """Frequencies (k,) [Hz], power spectral density (k,) of the measured output, and its noise floor."""
+    frequency, power = welch(
+        raw.output - raw.output.mean(), 1.0 / raw.period, nperseg=_segment(raw), detrend="linear"
+    )
+    return frequency, power, float(np.median(power[len(power) // 2 :]))
+
+
+def noise_of_output(raw: Stretch) -> float:
+    """Standard deviation of the white noise of a measured output; 0 where its floor is leakage of the spectrum's window."""
+    _, power, floor = _spectrum(raw)
+    return math.sqrt(0.5 * floor / raw.period) if floor >= FLOORLESS * float(power.max()) else 0.0
 
 
 def _lines(motions: Sequence[Motion], frequency: float, low: float) -> tuple[float, ...]:

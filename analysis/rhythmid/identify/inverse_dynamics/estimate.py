@@ -205,14 +205,11 @@ def _fitted(
     mean: Array = np.array([aligned.mean, *(known[name].mean for name in names)])
     precision: Array = np.array([aligned.std**-2, *(known[name].std ** -2 for name in names)])
     bounds = [(aligned.low, aligned.high), *(model.parameters[name].bounds for name in names)]
-    for place, name in enumerate(names, start=1):
-        if _divides(model, name):
-            bounds[place] = (max(bounds[place][0], LEAST_INERTIA * known[name].mean), bounds[place][1])
     low: Array = np.array([least for least, _ in bounds])
     high: Array = np.array([most for _, most in bounds])
-    value: Array = np.array([alignment, *(model.value(name) for name in names)])
-
     divides: NDArray[np.bool_] = np.array([False, *(_divides(model, name) for name in names)])
+    low[divides] = np.maximum(low, LEAST_INERTIA * mean)[divides]
+    value: Array = np.array([alignment, *(model.value(name) for name in names)])
 
     def cost(error: Array, at: Array, scale: float) -> float:
         return cost_of(error, scale) + 0.5 * float(precision @ (at - mean) ** 2)

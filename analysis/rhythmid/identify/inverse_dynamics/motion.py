@@ -141,9 +141,8 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
             drive = _mean_held(record.input, grid.time, grid.period) if held else grid.input
             drive = drive if grid.forcing is None else drive + grid.forcing
         short = short_gaps(grid.missing, int(longest / grid.period))
-        bridged = short | (
-            grid.missing & grid.valid
-        )  # where neighbouring samples determine a gap, the grid already has its values
+        # where neighbouring samples determine a gap, the grid already has its values
+        bridged = short | (grid.missing & grid.valid)
         output, drive = (across(signal, ~grid.missing, short) for signal in (grid.output, drive))
         for joined in runs(~grid.missing | bridged):
             measured = joined.start + np.flatnonzero(~grid.missing[joined])
@@ -253,9 +252,8 @@ def motion_of(stretch: Stretch, model: Model, frequency: float, low: float = 0.0
         base, base_rate, base_acceleration = _derivatives(time, drive)
     elif stretch.kind == "base_acceleration":
         base_acceleration = drive
-    relative = (
-        stretch.kind == "base_acceleration"
-    )  # the motion is then relative to the base, and the mass moves with the base as well
+    # the motion is then relative to the base, and the mass moves with the base as well
+    relative = stretch.kind == "base_acceleration"
     if stretch.measured == "position":
         position, velocity, acceleration = _derivatives(time, smooth)
     elif stretch.measured == "velocity":
@@ -269,9 +267,8 @@ def motion_of(stretch: Stretch, model: Model, frequency: float, low: float = 0.0
         position = high_pass(_integral(time, velocity), period, low)
     inertial = model.mass.value * (acceleration + (base_acceleration if relative else 0.0))
     moved = stretch.kind == "base_displacement"
-    if (
-        moved and stretch.measured == "acceleration"
-    ):  # the accelerometer does not show the base's slow motion either
+    # the accelerometer does not show the base's slow motion either
+    if moved and stretch.measured == "acceleration":
         base, base_rate = high_pass(base, period, low), high_pass(base_rate, period, low)
     return Motion(
         stretch.record, stretch.name, time, position, velocity, acceleration,

@@ -24,12 +24,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ON_TICK = 1e-9  # [s] tolerance within which a command counts as arrived
 KEPT = 16  # cached references behind a command path: those of the steps of one fit
-PROBED = (
-    0.0,
-    0.0137,
-    0.3711,
-    1.9173,
-)  # [s] times with irrational ratios at which a delay is evaluated to see whether it varies
+# [s] times with irrational ratios at which a delay is evaluated to see whether it varies
+PROBED = (0.0, 0.0137, 0.3711, 1.9173)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.least_squares import column_norms
 from rhythmid.identify.output_error import Fit, minimise, noise_of
 from rhythmid.identify.sample_clock.clock import clock_of
-from rhythmid.identify.sample_clock.tick_scan import scanned
+from rhythmid.identify.sample_clock.tick_scan import FINER, scanned
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.model import Model
 from rhythmid.simulation.transport import INPUT_DELAY
@@ -30,7 +30,6 @@ STEPS = np.linspace(-1.0, 1.0, 9)
 WIDE, FINE = 0.2, 1e-4  # range of the grid at first and at the end: shift of the last tick in periods
 SHIFTS = np.linspace(-1.0, 1.0, 7)
 LEAST_MOVE = 0.25  # sample periods: least shift of the delay while ticks move by more than a sample
-FINER = 0.4  # ratio of successive grid ranges
 FOLLOWED = 4  # cases that are refined further
 SCANS = 3  # largest number of scans, each with the noise model of the one before
 NOTHING_NEW = 0.98  # ratio of chi2 above which a scan brings no improvement

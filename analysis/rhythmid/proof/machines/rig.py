@@ -13,9 +13,8 @@ from rhythmid.proof.protocol import Run
 Array = NDArray[np.float64]
 Rng = np.random.Generator
 FINER = 8  # knots of a smooth command for each sample
-Recorded = Literal[
-    "command", "effort", "base", "reference", "nothing"
-]  # the recorded channel that drives the machine
+# the recorded channel that drives the machine
+Recorded = Literal["command", "effort", "base", "reference", "nothing"]
 
 
 @dataclass(frozen=True)
@@ -48,9 +47,8 @@ class Rig:
         scaled = replace(self.forcing, amplitude=self.forcing.amplitude * run.forcing)
         inside = [effect for effect in effects if effect != self.lacks]
         moved = self.recorded == "base"
-        sent = (
-            replace(run, rate=FINER * run.rate) if moved else run
-        )  # the motion of a base is smooth between samples, too
+        # the motion of a base is smooth between samples, too
+        sent = replace(run, rate=FINER * run.rate) if moved else run
         return observe(
             self.machine, inside, scaled, sent.time, sent.command, self.input_delay, self.measurement_delay,
             slopes=sent.slopes if moved else None, start=run.start, velocity=self.velocity, samples=run.time, lag=self.lag,
@@ -89,9 +87,8 @@ class Design:
         return tuple(name for effect in effects for name in self.known_with.get(effect, ()))
 
 
-LAGS = frozenset(
-    {"command_lag", "actuator_lag", "sensor_lag"}
-)  # indistinguishable in a linear machine with one input
+# indistinguishable in a linear machine with one input
+LAGS = frozenset({"command_lag", "actuator_lag", "sensor_lag"})
 
 
 def log_uniform(rng: Rng, low: float, high: float) -> float:
