@@ -183,7 +183,7 @@ class Rows:
         size[~told] = 1.0
         low = [0.0 if name in POSITIVE else -np.inf for name in names]
         # the triangle of the rows has the same solution and the same residual, in as many rows as columns
-        triangle = np.linalg.qr(np.column_stack([matrix / size, side]), mode="r")
+        triangle = np.asarray(np.linalg.qr(np.column_stack([matrix / size, side]), mode="r"))
         solved = lsq_linear(triangle[:, :-1], triangle[:, -1], (low, np.inf), method="bvls")
         told &= solved.active_mask == 0
         power = float(np.sum((drives - (0.0 if self.steady else drives.mean())) ** 2)) or 1.0
