@@ -80,7 +80,7 @@ def test_a_drifting_input_delay_is_found_and_taken_out():
     assert near(found, U, DELAYS[0], 5e-5) and near(found, Y, DELAYS[1])
 
 
-@pytest.mark.parametrize("period", [0.0137, 0.0333])
+@pytest.mark.parametrize("period", [0.0137, pytest.param(0.0333, marks=pytest.mark.long)])
 def test_a_command_held_at_any_slower_rate_is_found(period):
     joint = fitted(concealing("command_hold", period=period))
     assert joint.fit.model.value(U) == pytest.approx(DELAYS[0] + 0.5 * period, abs=1e-3)  # unless modelled
