@@ -1,14 +1,16 @@
 """`rhythmid split`: a table of several recordings becomes a table for each."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rhythmid.errors import InputError
+from rhythmid.record.grouped_runs import grouped_runs
 from rhythmid.record.read import read_record
 from rhythmid.record.signals import Signals
-from rhythmid.record.split import recordings, split
+from rhythmid.record.split import recordings, split, split_runs
 from rhythmid.record.table import Table
 
 LENGTHS = (40, 60, 50)
@@ -102,3 +104,27 @@ def test_a_folder_that_cannot_be_finished_leaves_nothing(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="parts: cannot be written: No space left on device"):
         split(whole, recordings(whole)[1], tmp_path / "parts")
     assert [path.name for path in tmp_path.iterdir()] == ["log.npz"]
+
+
+def in_arrays(folder: Path, **more: object) -> Table:
+    """One list of rows for each recording, as WPILib's SysId writes them."""
+    parts = np.split(np.column_stack([TIME + 7.0, ANGLE]), np.cumsum(LENGTHS)[:-1])
+    runs = dict(
+        zip(("fast-backward", "fast-forward", "slow-forward"), (part.tolist() for part in parts), strict=True)
+    )
+    (folder / "sysid.json").write_text(
+        json.dumps({**runs, "test": "Simple", "unitsPerRotation": 6.28, **more})
+    )
+    return Table.load(folder / "sysid.json")
+
+
+def test_recordings_that_are_an_array_each_become_tables(tmp_path):
+    runs = grouped_runs(in_arrays(tmp_path))
+    assert runs is not None and runs.note == "3 runs, fast-backward to slow-forward"
+    made = split_runs(in_arrays(tmp_path), runs, tmp_path / "parts")
+    assert [path.name for path in made] == [f"sysid_{name}.npz" for name in runs.members]
+    np.testing.assert_array_equal(Table.load(made[1]).column("1"), ANGLE[EPISODE == 1])
+
+
+def test_arrays_beside_another_array_are_no_recordings(tmp_path):
+    assert grouped_runs(in_arrays(tmp_path, gains=[1.0, 2.0, 3.0])) is None

@@ -26,9 +26,9 @@ def split(
     json: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Write each recording of a table that holds several, one below the other or in a struct array, as a table of its own (.npz).
+    """Write each recording of a table that holds several, one below the other, in a struct array or each in an array, as a table of its own (.npz).
 
-    Without --by they are told apart by the struct that holds each, else by a column such as episode_index, else by where the time
+    Without --by they are told apart by the struct or array that holds each, else by a column such as episode_index, else by where the time
     begins anew.
     """
     from rhythmid.record.grouped_runs import grouped_runs
@@ -40,7 +40,7 @@ def split(
     found = Table.load(table)
     runs = grouped_runs(found) if by is None else None
     if runs is not None:
-        why, made = "the struct that holds each", split_runs(found, runs, out)
+        why, made = "the struct or array that holds each", split_runs(found, runs, out)
     else:
         why, rows = recordings(found, by)
         made = write(found, rows, out)
