@@ -26,7 +26,9 @@ def problem(rng, size, own):
     inverse = np.linalg.inv(jacobian.T @ jacobian)
     error = inverse @ (jacobian.T @ measured)
     residual = jacobian @ error - measured
-    added = mean_product(jacobian, residual, np.geomspace(1.0, 50.0, CANDIDATES) * candidates, inverse)
+    added = mean_product(
+        jacobian, residual, np.geomspace(1.0, 50.0, CANDIDATES) * candidates, inverse, np.inf
+    )
     return error, np.sqrt(np.diag(inverse)), np.sqrt(np.diag(inverse + added))
 
 
@@ -44,10 +46,12 @@ def test_many_rows_give_the_same_in_parts(monkeypatch):
     jacobian, candidates = rng.standard_normal((500, 3)), rng.standard_normal((500, 4))
     residual = 3.0 * candidates @ rng.standard_normal(4) + rng.standard_normal(500)
     inverse = np.linalg.inv(jacobian.T @ jacobian)
-    whole = mean_product(jacobian, residual, candidates, inverse)
+    whole = mean_product(jacobian, residual, candidates, inverse, np.inf)
     monkeypatch.setattr(discrepancy, "ROWS", 40)
     monkeypatch.setattr(discrepancy, "reduced", partial(reduced, most=60))
-    np.testing.assert_allclose(mean_product(jacobian, residual, candidates, inverse), whole, rtol=1e-9)
+    np.testing.assert_allclose(
+        mean_product(jacobian, residual, candidates, inverse, np.inf), whole, rtol=1e-9
+    )
     assert whole.any()
 
 
@@ -72,7 +76,7 @@ def test_candidates_that_change_nothing_or_that_are_none_add_nothing():
     jacobian, residual = rng.normal(size=(50, 2)), rng.normal(size=50)
     inverse = np.linalg.inv(jacobian.T @ jacobian)
     for none in (np.zeros((50, 0)), np.zeros((50, 3))):
-        assert not mean_product(jacobian, residual, none, inverse).any()
+        assert not mean_product(jacobian, residual, none, inverse, np.inf).any()
 
 
 def test_a_candidate_that_the_parameters_absorb_whole_adds_nothing_by_itself():
@@ -80,4 +84,17 @@ def test_a_candidate_that_the_parameters_absorb_whole_adds_nothing_by_itself():
     jacobian = rng.normal(size=(200, 2))
     inverse = np.linalg.inv(jacobian.T @ jacobian)
     residual = rng.normal(size=200)
-    assert not mean_product(jacobian, residual, jacobian @ np.array([[1.0], [2.0]]), inverse).any()
+    assert not mean_product(jacobian, residual, jacobian @ np.array([[1.0], [2.0]]), inverse, np.inf).any()
+
+
+def test_a_law_that_the_parameters_reproduce_almost_whole_is_no_larger_than_what_models_of_real_machines_leave():
+    rng = np.random.default_rng(3)
+    jacobian = rng.normal(size=(400, 2))
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    law = (jacobian @ np.array([1.0, 0.5]) + 0.003 * rng.normal(size=400))[:, None]
+    residual = rng.normal(size=400)
+    signal = 100.0 * np.sqrt(400.0)  # a hundred times the noise
+    std = np.sqrt(np.diag(mean_product(jacobian, residual, law, inverse, signal)))
+    share = np.abs(std[0] * np.linalg.norm(jacobian[:, 0]) / signal)
+    assert share < 0.05
+    assert np.diag(mean_product(jacobian, residual, law, inverse, np.inf))[0] > 4.0 * std[0] ** 2

@@ -7,7 +7,8 @@ candidates and of free functions of the motion. Each has its own size, normal ab
 
 An effect counts as small if the model's parameters do not reproduce much of it: only that part is visible in the residual. The
 part that they reproduce, such as most of a quadratic drag beside a viscous damper, may be large. All effects therefore have the
-same expected visible part, not the same force.
+same expected visible part, not the same force, as long as the whole effect stays within what models of real machines leave: of a
+law that the parameters reproduce to a hundredth, nothing visible says how large it is.
 
 The residual informs about the scale but does not fix it: an effect that it hardly shows may still be present. The scale is
 therefore integrated out, with a half-Cauchy prior whose median is one standard deviation of the noise
@@ -17,6 +18,7 @@ therefore integrated out, with a half-Cauchy prior whose median is one standard 
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.diagnose.constants import LEFT
 from rhythmid.identify.least_squares import orthonormal, reduced
 
 Array = NDArray[np.float64]
@@ -27,10 +29,9 @@ ROWS = 20_000  # rows processed at once
 # share of a candidate's response outside the parameters' span up to which the two are observationally equivalent: the estimate then
 # means both together
 ABSORBED = 1e-3
-ROUNDING = 1e-6  # share of the visible parts below which a direction is rounding
 
 
-def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: Array) -> Array:
+def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: Array, signal: float) -> Array:
     """Mean product (p, p) of the parameter errors that are due to effects which the model lacks.
 
     Parameters
@@ -39,6 +40,7 @@ def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: A
     residual : (n,) predicted less measured, in units of its noise.
     candidates : (n, m) changes of the prediction by effects that the model may lack, each of arbitrary size.
     inverse : (p, p) inverse of the parameters' information matrix (jacobianᵀ jacobian plus the precision of the priors).
+    signal : norm of what was measured, about its mean, in units of the residual's noise; a whole effect is about `LEFT` of it at most.
 
     Returns
     -------
@@ -56,30 +58,27 @@ def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: A
     columns, left = candidates[:, shows] / visible[shows], left[:, shows] / visible[shows]
     rest = residual - basis @ (basis.T @ residual)
     free = rows - basis.shape[1] - left.shape[1]
-    if free <= 0 or not left.shape[1]:
+    if free <= 0 or not left.shape[1] or signal <= 0.0:
         return np.zeros_like(inverse)
-    # along these directions the residual contains missing effects and noise, elsewhere noise only
-    directions, strengths, mixing = np.linalg.svd(left, full_matrices=False)
-    seen = strengths > ROUNDING
-    shown, strengths = -(directions[:, seen].T @ rest), strengths[seen]
+    # rows in as many directions as there are candidates; elsewhere the residual contains noise only
+    frame, corner = np.linalg.qr(left)
+    shown = -(frame.T @ rest)
     # the remainder may exceed the assumed noise, and neighbouring rows may be correlated; both reduce the information
     noise = max((float(rest @ rest) - float(shown @ shown)) / free, 1.0)
     moved = inverse @ (jacobian.T @ columns)
-    scales = np.sqrt(noise) * SCALES
-    found = np.zeros_like(inverse)
-    for scale, weight in zip(scales, _weights(shown, strengths, noise), strict=True):
-        share = scale**2 * strengths / (noise + scale**2 * strengths**2)
-        mean = mixing[seen].T @ (share * shown)
-        # a direction that the parameters absorb completely is left to them
-        spread = (mixing[seen].T * (scale**2 * (1.0 - share * strengths))) @ mixing[seen]
-        found += weight * (moved @ (spread + np.outer(mean, mean)) @ moved.T)
-    return found
-
-
-def _weights(shown: Array, strengths: Array, noise: float) -> Array:
-    """Posterior probabilities (s,) of the common scales `SCALES`, each for an equal interval of its logarithm."""
-    variance = noise * (1.0 + SCALES[:, None] ** 2 * strengths**2)
-    log_density = -0.5 * np.sum(np.log(variance) + shown**2 / variance, axis=1)
-    log_density += np.log(SCALES / (1.0 + SCALES**2))
-    weights = np.exp(log_density - log_density.max())
-    return np.asarray(weights / weights.sum())
+    most = (
+        LEFT * signal * visible[shows] / whole[shows]
+    )  # of the visible part, where the whole effect is at its largest
+    found, evidence = [], []
+    for scale in np.sqrt(noise) * SCALES:
+        size = 1.0 / np.hypot(1.0 / scale, 1.0 / most)
+        part = corner * size
+        variance = noise * np.eye(len(part)) + part @ part.T
+        gain = np.linalg.solve(variance, part).T
+        mean = gain @ shown
+        spread = np.eye(len(size)) - gain @ part
+        found.append(moved * size @ (spread + np.outer(mean, mean)) @ (moved * size).T)
+        evidence.append(-0.5 * (np.linalg.slogdet(variance)[1] + shown @ np.linalg.solve(variance, shown)))
+    log_weights = np.array(evidence) + np.log(SCALES / (1.0 + SCALES**2))  # equal intervals of the logarithm
+    weights = np.exp(log_weights - log_weights.max())
+    return np.asarray(np.tensordot(weights / weights.sum(), np.array(found), 1), dtype=np.float64)

@@ -363,7 +363,11 @@ def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.floa
     columns = columns[:, :count]
     priors = [fit.model.parameters[name].prior for name, one in zip(fit.names, known) if one]
     inverse = covariance_of(line.jacobian[:, known], priors)
-    made[np.ix_(known, known)] = mean_product(line.jacobian[:, known], line.residual, columns, inverse)
+    motion = whitened(fit, [one.averaged - one.averaged.mean() for one in fit.run.series], fit.noise)
+    signal = float(np.linalg.norm(line.without_starts(motion)))
+    made[np.ix_(known, known)] = mean_product(
+        line.jacobian[:, known], line.residual, columns, inverse, signal
+    )
     return made
 
 

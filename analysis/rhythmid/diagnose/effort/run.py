@@ -243,7 +243,10 @@ def small_effects(balance: Balance, chosen: Fitted, catalogue: Catalogue) -> Arr
     changes = columns_of(balance, fit, [one.start for one in screen(balance, fit, starts)])
     rows = weighted(fit, fit.correlation)
     free = map_columns(balance, chosen, FreeMap(list(balance.motions), size_of(balance)))
-    changes = np.hstack([changes, free]) * root_weights(fit, fit.correlation)[:, None]
+    root = root_weights(fit, fit.correlation)
+    changes = np.hstack([changes, free]) * root[:, None]
+    signal = float(np.linalg.norm((balance.measured - balance.measured.mean()) * root))
+    errors = mean_product(rows.columns, rows.residual, changes, rows.inverse, signal)
     std = np.zeros(len(fit.std))
-    std[rows.inside] = np.sqrt(np.diag(mean_product(rows.columns, rows.residual, changes, rows.inverse)))
+    std[rows.inside] = np.sqrt(np.diag(errors))
     return std
