@@ -159,7 +159,7 @@ def effort_run(
     weighed = _weighed(ruled_out, rows.blocks, time) | _weighed(predicted, rows.blocks, time)
     errors = {tuple(sorted(key)): rows.rms(one) for key, one in (ruled_out | predicted).items()}
     maps = _weighed(mapped, rows.blocks, time)
-    if places == 1:  # a joint's motion is measured together with those of others
+    if case.records:  # the motion of a body's joint comes without them
         noise = noise_power(found.balance, case.records, found.chosen.fit.model)
         maps = {of: beyond_noise(one, weighed[found.chosen.elements], noise) for of, one in maps.items()}
 
