@@ -48,7 +48,22 @@ def _interrupted_afterwards() -> Iterator[None]:
             signal.raise_signal(signal.SIGINT)
 
 
-def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Iterable[int], pipe: Any) -> None:
+def _work(
+    function: Callable[[Any], Any],
+    items: Sequence[Any],
+    own: Iterable[int],
+    pipe: Any,
+    inherited: Iterable[Any],
+) -> None:
+    """Answer for the `own` items, until the parent has gone."""
+    for one in inherited:  # the parent's ends of pipes; were they open here, its death would not show
+        one.close()
+    with suppress(EOFError, BrokenPipeError):
+        _answer(function, items, own, pipe)
+    pipe.close()
+
+
+def _answer(function: Callable[[Any], Any], items: Sequence[Any], own: Iterable[int], pipe: Any) -> None:
     # What was inherited is not this process's to collect: going through it would copy the parent's memory, and may
     # meet frames of threads that exist in the parent only.
     gc.freeze()
@@ -66,7 +81,6 @@ def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Iterable[in
             pipe.send(answer)
         except (pickle.PicklingError, TypeError, AttributeError) as error:
             pipe.send((index, None, RuntimeError(f"a worker's result cannot be sent back: {error}")))
-    pipe.close()
 
 
 def each(
@@ -118,7 +132,9 @@ def fork_map(
 
     def start(own: list[int]) -> None:
         receive, send = context.Pipe(duplex=False)
-        process = context.Process(target=_work, args=(function, items, tuple(own), send), daemon=True)
+        process = context.Process(
+            target=_work, args=(function, items, tuple(own), send, (receive, *running)), daemon=True
+        )
         with _interrupted_afterwards():
             process.start()
             running[receive] = (process, own)
@@ -172,7 +188,9 @@ def fork_each(
     def start() -> None:
         ours, theirs = context.Pipe()
         given: Iterator[int] = iter(theirs.recv, None)
-        process = context.Process(target=_work, args=(function, items, given, theirs), daemon=True)
+        process = context.Process(
+            target=_work, args=(function, items, given, theirs, (ours, *running)), daemon=True
+        )
         with _interrupted_afterwards():
             process.start()
             theirs.close()

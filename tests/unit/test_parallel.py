@@ -4,10 +4,12 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 from rhythmid.errors import InputError
 from rhythmid.freed_memory import give_back
@@ -51,6 +53,42 @@ def test_work_that_kills_every_worker_is_raised():
 
     with pytest.raises(RuntimeError, match="two workers died at the same work, exit code -9"):
         list(fork_map(work, [0, 1, 2], 2))
+
+
+ORPHANS = """
+import os, sys, time
+from pathlib import Path
+from rhythmid.parallel import {way}
+
+def work(n):
+    Path(sys.argv[1], str(os.getpid())).touch()
+    return bytes(10_000_000)
+
+for _ in {way}(work, list(range(8)), 2):
+    time.sleep(1000.0)
+"""
+
+
+@pytest.mark.parametrize("way", ["fork_map", "fork_each"])
+def test_workers_end_after_their_parent_was_killed(tmp_path: Path, way: str):
+    parent = subprocess.Popen([sys.executable, "-c", ORPHANS.format(way=way), tmp_path])
+    until = time.monotonic() + PATIENCE
+    while len(workers := [int(one.name) for one in tmp_path.iterdir()]) < 2 and time.monotonic() < until:
+        time.sleep(0.05)
+    parent.kill()
+    parent.wait()
+    assert len(workers) == 2
+    while any(_runs(pid) for pid in workers) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not any(_runs(pid) for pid in workers)
+
+
+def _runs(pid: int) -> bool:
+    """Whether a process runs; one that has ended may wait for whoever adopted it."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
 
 
 def test_a_worker_does_its_own_parts_one_after_another():
