@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from axes import axis, axis_model
+from axes import axis, axis_model, frame, frame_model
 
 from rhythmid.diagnose.effort.reference import beyond_noise
 from rhythmid.diagnose.hypothesis import Prediction
@@ -33,6 +33,18 @@ def test_the_noise_of_the_motion_in_the_required_effort_is_that_of_its_floor():
     assert found == pytest.approx(float(np.mean(everywhere**2)), rel=0.5)
     assert found < true  # the filter of the comparison takes noise off
     assert noise_power(clean, [quiet], model) < 0.05 * found
+
+
+def test_the_effort_of_a_machine_on_a_moving_base_holds_the_same_noise():
+    model, clean = frame_model(), frame()
+    noisy = noisier(clean, 4e-4)
+    balance = Balance.of([noisy], model)
+    before = Balance.of([clean], model, balance.bandwidth)
+    error, own = (
+        one.filtered(one.required(model)[0] - one.motions[0].effort, one.motions[0].period)
+        for one in (balance, before)
+    )
+    assert noise_power(balance, [noisy], model) == pytest.approx(float(np.mean((error - own) ** 2)), rel=0.5)
 
 
 def prediction(error):

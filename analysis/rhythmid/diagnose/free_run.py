@@ -3,10 +3,8 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.alternatives import alternatives
@@ -22,10 +20,8 @@ from rhythmid.diagnose.contenders import (
     remembered,
     rows_of,
 )
-from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.evidence import detectable, prediction
 from rhythmid.diagnose.fine_steps import finely_stepped
-from rhythmid.diagnose.free_functions import motion_maps
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.diagnose.intervals import profiled
 from rhythmid.diagnose.location import Dependence, dependences
@@ -34,25 +30,20 @@ from rhythmid.diagnose.refitted_map import refitted_map
 from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import Search, search
 from rhythmid.diagnose.search.refit import reach_of, whole_fit
-from rhythmid.diagnose.search.round import distinct
 from rhythmid.diagnose.search.score_tests import (
     Trajectories,
-    changes_of,
-    sizes_along,
     trajectories,
     under,
-    whitened,
 )
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.shape import shape_of
 from rhythmid.diagnose.size_error import size_errors
+from rhythmid.diagnose.small_effects import small_effects
 from rhythmid.diagnose.tick_interval import ticks_followed
 from rhythmid.diagnose.verdict import Decision, decide
-from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.command_jitter import command_jitter, weighed
-from rhythmid.identify.covariance import covariance_of
 from rhythmid.identify.output_error import Fit, rerun
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.robust_covariance import with_robust_covariance
@@ -297,7 +288,7 @@ class _Weighing:
         unnamed = np.zeros_like(between)
         if not self.passed(SMALL_EFFECTS):
             case.tell("adding to the standard deviations what small effects may change")
-            unnamed = _unnamed(found, self.catalogue, case)
+            unnamed = small_effects(found, self.catalogue, case)
         fit = with_robust_covariance(found.fit)
         errors = size_errors(fit.model, chosen.elements, fit.std)
         return replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed)), errors
@@ -333,42 +324,6 @@ def _unconverged(nominal: Fit, found: Search) -> list[Untried]:
         for name, fit in named.items()
         if fit.message == SPENT
     ]
-
-
-def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.float64]:
-    """Mean product (p, p) of the fit's parameter errors due to small effects that it lacks.
-
-    The effects are: for each element that the model may lack, the guess with the best score in the last round; and forces
-    that are arbitrary functions of position or velocity.
-    """
-    fit = found.fit
-    made = np.zeros((len(fit.names), len(fit.names)))
-    run = trajectories(fit)
-    lacking = candidates(catalogue, fit.model.setting, sizes_along(run)).tried
-    names = {element.name for element, _ in lacking}
-    scored = distinct(found.rounds[-1].scores, len(catalogue)) if found.rounds else []
-    tried = [(one.element, dict(one.values)) for one, _ in scored if one.element.name in names]
-    std = np.array([fit.std[name] for name in fit.names])
-    known = np.isfinite(std) & (std > 0.0)
-    if not known.any():
-        return made
-    line = fit.linearisation
-    maps = [column for one in motion_maps(run, case.pool) for column in one.columns]
-    # filled in place: for long records a second copy of all columns would be too large
-    columns = np.empty((len(line.residual), len(tried) + len(maps)), order="F")
-    count = 0
-    for outputs in chain((one.outputs for one in changes_of(run, tried, case.pool)), maps):
-        columns[:, count] = line.without_starts(whitened(fit, outputs, fit.noise))
-        count += 1
-    columns = columns[:, :count]
-    priors = [fit.model.parameters[name].prior for name, one in zip(fit.names, known) if one]
-    inverse = covariance_of(line.jacobian[:, known], priors)
-    motion = whitened(fit, [one.averaged - one.averaged.mean() for one in fit.run.series], fit.noise)
-    signal = float(np.linalg.norm(line.without_starts(motion)))
-    made[np.ix_(known, known)] = mean_product(
-        line.jacobian[:, known], line.residual, columns, inverse, signal
-    )
-    return made
 
 
 def _with_jitter(scoring: Scoring) -> Calibration:

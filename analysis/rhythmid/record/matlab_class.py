@@ -23,9 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
-OBJECT = (
-    0xDD000000  # first word of an array that refers to an object; the last two are its number and its class
-)
+# first word of an array that refers to an object; the last two are its number and its class
+OBJECT = 0xDD000000
 HEADER = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"  # of a file with little-endian numbers
 SUBSYSTEM = "__function_workspace__"  # name under which scipy keeps the subsystem data
 NAMES = 40  # offset of the names [bytes]

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from rhythmid.deadline import deadline
 from rhythmid.diagnose.case import SEARCHED, Case
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT, UNNAMED_EFFORT
-from rhythmid.diagnose.discrepancy import mean_product
-from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
 from rhythmid.diagnose.effort.fitted import Fitted, odds_at_rest
 from rhythmid.diagnose.effort.lasting_error import lasting_share
 from rhythmid.diagnose.effort.reference import (
@@ -19,13 +17,12 @@ from rhythmid.diagnose.effort.reference import (
     Mapped,
     beyond_noise,
     history_of,
-    map_columns,
     reference_of,
     residual_with_map,
 )
 from rhythmid.diagnose.effort.remainder import Curve, remainder_of
-from rhythmid.diagnose.effort.scales import scales_at
 from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
+from rhythmid.diagnose.effort.small_effects import small_effects
 from rhythmid.diagnose.evidence import (
     Blocks,
     CrossValidated,
@@ -45,10 +42,9 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import size_of, variation_of
-from rhythmid.identify.inverse_dynamics.free_map import FreeMap
+from rhythmid.identify.inverse_dynamics.estimate import variation_of
 from rhythmid.identify.inverse_dynamics.motion_noise import noise_power
-from rhythmid.identify.robust_covariance import root_weights, weighted, with_robust_std
+from rhythmid.identify.robust_covariance import with_robust_std
 
 Array = NDArray[np.float64]
 K = TypeVar("K")
@@ -159,7 +155,7 @@ def effort_run(
     weighed = _weighed(ruled_out, rows.blocks, time) | _weighed(predicted, rows.blocks, time)
     errors = {tuple(sorted(key)): rows.rms(one) for key, one in (ruled_out | predicted).items()}
     maps = _weighed(mapped, rows.blocks, time)
-    if case.records:  # the motion of a body's joint comes without them
+    if case.records:  # for the joint of a body only the balance is given
         noise = noise_power(found.balance, case.records, found.chosen.fit.model)
         maps = {of: beyond_noise(one, weighed[found.chosen.elements], noise) for of, one in maps.items()}
 
@@ -230,23 +226,3 @@ def _among_models(
     std = fit.std.copy()  # the alignment comes first and belongs to no model
     std[1:] = np.hypot(std[1:], np.sqrt(np.diag(between)))
     return replace(chosen, fit=replace(fit, std=np.hypot(std, small_effects(balance, chosen, catalogue))))
-
-
-def small_effects(balance: Balance, chosen: Fitted, catalogue: Catalogue) -> Array:
-    """Standard deviations (p,) of the fit's parameters due to small effects that it lacks.
-
-    The effects are those of the catalogue and any function of the motion.
-    """
-    fit = chosen.fit
-    sizes = scales_at(balance, fit)
-    starts = [one for one in starts_of(catalogue, fit.model, sizes, balance) if one.kind == "effects"]
-    changes = columns_of(balance, fit, [one.start for one in screen(balance, fit, starts)])
-    rows = weighted(fit, fit.correlation)
-    free = map_columns(balance, chosen, FreeMap(list(balance.motions), size_of(balance)))
-    root = root_weights(fit, fit.correlation)
-    changes = np.hstack([changes, free]) * root[:, None]
-    signal = float(np.linalg.norm((balance.measured - balance.measured.mean()) * root))
-    errors = mean_product(rows.columns, rows.residual, changes, rows.inverse, signal)
-    std = np.zeros(len(fit.std))
-    std[rows.inside] = np.sqrt(np.diag(errors))
-    return std
