@@ -104,7 +104,12 @@ def test_windows_in_which_nothing_is_missing_tell_what_a_free_run_says(monkeypat
     ]
     fit = SimpleNamespace(fit=SimpleNamespace(model=hopper(), std={}))
     effort = SimpleNamespace(
-        applies=False, free_run_means_something=True, effort_share=0.0, notes=(), band_left_out=False
+        applies=False,
+        free_run_means_something=True,
+        effort_share=0.0,
+        notes=(),
+        band_left_out=False,
+        noisier=False,
     )
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
     monkeypatch.setattr(module, "settle", lambda *_: iter([SimpleNamespace(kind="windows")] * 2))
@@ -249,11 +254,12 @@ def asked(
     follows: bool = False,
     verdict: Verdict = "undecided",
     band_left_out: bool = False,
+    noisier: bool = False,
 ) -> list[str]:
     """What is scored, in order, where nothing is named. `verdict` is that of effort scoring, after which the motion leaves all undecided.
 
     `means` says whether a free run means something, `follows` whether the model then follows the machine, `share` is the effort's of the
-    inertial force, `error` what is left of it.
+    inertial force, `error` what is left of it, `noisier` whether it has more noise than the motion.
     """
     order: list[str] = []
 
@@ -269,7 +275,7 @@ def asked(
         return SimpleNamespace(search=SimpleNamespace(fit=SimpleNamespace(model=hopper(), std={})))
 
     effort = SimpleNamespace(
-        applies=True, free_run_means_something=means, effort_share=share, notes=(), band_left_out=band_left_out
+        applies=True, free_run_means_something=means, effort_share=share, notes=(), band_left_out=band_left_out, noisier=noisier
     )  # fmt: skip
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
     monkeypatch.setattr(module, "_by_effort", by_effort)
@@ -320,7 +326,7 @@ def test_the_effort_is_scored_where_no_window_serves_although_those_come_first(m
 
     found = diagnosed("undecided", kind="effort")
     effort = SimpleNamespace(
-        applies=True, free_run_means_something=True, effort_share=0.5, notes=(), band_left_out=True
+        applies=True, free_run_means_something=True, effort_share=0.5, notes=(), band_left_out=True, noisier=False
     )  # fmt: skip
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
     monkeypatch.setattr(module, "settle", lambda *given: fails() if given[-1] else iter([]))
@@ -342,3 +348,10 @@ def test_the_effort_of_a_quasi_static_machine_comes_before_a_free_run_that_follo
     monkeypatch, share, first
 ):
     assert asked(monkeypatch, True, share, follows=True)[0] == first
+
+
+@pytest.mark.parametrize(("noisier", "first"), [(True, "effort"), (False, "free_run")])
+def test_an_effort_with_more_noise_than_the_motion_is_predicted_and_drives_no_free_run(
+    monkeypatch, noisier, first
+):
+    assert asked(monkeypatch, True, 2.0, follows=True, noisier=noisier)[0] == first

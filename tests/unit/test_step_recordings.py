@@ -1,5 +1,6 @@
 """Step tests as a small computer logs them: tables without names, times of an uneven loop, one level of the drive in each."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -51,8 +52,10 @@ def test_what_is_the_same_in_all_recordings_drives_nothing(tmp_path):
     assert "input" not in start(sources).guess.roles.choices
 
 
-def test_the_part_that_may_be_used_is_told_on_the_clock_of_the_record(tmp_path):
+@pytest.mark.parametrize("offset", [13.0, 1.7e9])
+def test_the_part_that_may_be_used_is_told_on_the_clock_of_the_record(tmp_path, offset):
     table = np.loadtxt(stepped(tmp_path, 60.0), delimiter=";")
-    table[:, 1] += 13.0
-    np.savetxt(tmp_path / "late.csv", table, delimiter="; ")
-    assert f"# use: [{table[0, 1]:.6g}, {table[-1, 1]:.6g}]" in guess(tmp_path / "late.csv").signals
+    table[:, 1] += offset
+    np.savetxt(tmp_path / "late.csv", table, delimiter="; ", fmt="%.6f")
+    told = re.search(r"# use: \[(.*), (.*)\]", guess(tmp_path / "late.csv").signals)
+    assert told and [float(t) for t in told.groups()] == pytest.approx(table[[0, -1], 1], abs=2e-3, rel=0)

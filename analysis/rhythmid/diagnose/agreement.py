@@ -14,12 +14,13 @@ UNSETTLED: tuple[Verdict, ...] = ("undecided", "unknown_physics")
 DOUBTED = "Believe neither without another experiment."
 
 
-def tells_all(found: Diagnosis, quasi_static: bool) -> bool:
+def tells_all(found: Diagnosis, disturbed: bool) -> bool:
     """Whether effort scoring leaves nothing that the motion could tell: little effort, and nothing without a name.
 
-    The motion of a quasi-static machine, a small difference of large forces, tells less than even a little effort.
+    A free run that small errors of the effort disturb tells less than even a little effort: that of a quasi-static machine, whose
+    motion is a small difference of large forces, or that of a machine whose recorded effort has more noise than its motion.
     """
-    return found.augmented.train_nrmse < LEFT and (found.verdict not in UNSETTLED or quasi_static)
+    return found.augmented.train_nrmse < LEFT and (found.verdict not in UNSETTLED or disturbed)
 
 
 def contradictions(chosen: int, made: Sequence[Diagnosis]) -> tuple[str, ...]:

@@ -290,8 +290,8 @@ def _answers(
 ) -> Iterator[Answer]:
     """Answers of all applicable scoring modes, the most informative first, computed on demand.
 
-    A free run that follows the machine comes first, unless the machine is quasi-static. Otherwise effort comes first where it
-    is at least as large as the inertial force, because it then moves the machine against other forces. Windows come first
+    A free run that follows the machine comes first, unless the machine is quasi-static or the effort has more noise than the
+    motion. Otherwise effort comes first where it is at least as large as the inertial force, because it then moves the machine against other forces. Windows come first
     where the machine swings by itself, and where a band with much of the effort cannot be compared by effort. Effort is scored
     on the `whole` case, whose records are not cut. After a first answer no further mode begins once the budget is spent; the next
     mode is then added to `untried`.
@@ -304,12 +304,12 @@ def _answers(
             untried.append(Untried(way, SPENT))
         return case.budget.spent
 
-    quasi_static = effort.effort_share >= QUASI_STATIC
-    first = effort.applies and (quasi_static or not (effort.free_run_means_something or effort.band_left_out))
+    disturbed = effort.noisier or effort.effort_share >= QUASI_STATIC
+    first = effort.applies and (disturbed or not (effort.free_run_means_something or effort.band_left_out))
     if first:
         answer = _by_effort(whole, effort, effort_notes)
         yield answer
-        if tells_all(answer.diagnosis, quasi_static) or late(BY_MOTION):
+        if tells_all(answer.diagnosis, disturbed) or late(BY_MOTION):
             return
     series = prepare((*case.records, *case.holdout))
     by_motion = partial(_by_motion, case, series, given.notes, late)

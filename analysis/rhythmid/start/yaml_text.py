@@ -109,7 +109,9 @@ def signals_yaml(
 def _whole(roles: Roles) -> str:
     """The line that uses the whole record, on the clock of its output."""
     time = roles.choices["output"].recorded.time
-    return f"use: [{time[0]:.6g}, {time[-1]:.6g}]"
+    # milliseconds also of times since 1970
+    begin, end = (f"{t:.{max(6, len(str(int(abs(t)))) + 3)}g}" for t in (float(time[0]), float(time[-1])))
+    return f"use: [{begin}, {end}]"
 
 
 def _time_doubt(clock: Clock) -> list[str]:

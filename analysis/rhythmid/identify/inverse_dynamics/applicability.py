@@ -11,6 +11,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.bandwidth import MUCH, Bandwidth
+from rhythmid.identify.inverse_dynamics.effort_noise import effort_is_noisier
 from rhythmid.identify.inverse_dynamics.estimate import condition_of, fit_effort, size_of
 from rhythmid.identify.inverse_dynamics.rests import told
 from rhythmid.model import INERTIA, Model
@@ -43,8 +44,9 @@ class Applicability:
     whether the model has a restoring force for the measured quantity, `closed` whether it has a controller. A long
     free run is meaningful for a machine with a restoring force and without a controller. `recorded` says whether
     there are rows of effort, `notes` which of them were interpolated, and which band is not compared although the
-    effort goes with the motion there; `band_left_out` says whether there is one. `balance` holds the rows. It is None where a
-    free run comes first: the rows of long records are large, and a search rebuilds them where needed.
+    effort goes with the motion there; `band_left_out` says whether there is one. `noisier` says whether the
+    effort has more noise than the motion, so that a free run would be driven by noise. `balance` holds the
+    rows. It is None where a free run may come first: the rows of long records are large, and a search rebuilds them where needed.
     """
 
     applies: bool
@@ -59,6 +61,7 @@ class Applicability:
     notes: tuple[str, ...] = ()
     balance: Balance | None = None
     band_left_out: bool = False
+    noisier: bool = False
 
     @property
     def free_run_means_something(self) -> bool:
@@ -103,11 +106,12 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
             f"the motion does not tell the parameters apart (condition number {condition:.3g})",
         )
     restoring = restores(balance, model, records[0].output_kind)
+    means_something = restoring and not closed
     left_out = _left_out(chosen)
     return Applicability(
         applies, reason, chosen.effort, condition, chosen.explained, share,
-        restoring, closed, True, (*balance.notes, *left_out), None if restoring and not closed else balance,
-        bool(left_out),
+        restoring, closed, True, (*balance.notes, *left_out), None if means_something else balance, bool(left_out),
+        applies and not driven and effort_is_noisier(balance, records, fit.model),
     )  # fmt: skip
 
 

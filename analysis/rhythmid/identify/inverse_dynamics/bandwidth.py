@@ -56,6 +56,7 @@ class Bandwidth:
     motion's strongest frequency. Where an acceleration was measured, the motion is unknown below `low` [Hz].
     `left_out` is the share of the effort's power above `effort` that goes with the motion, up to `left_out_to` [Hz].
     `mapped` is the share that a free map alone explains in the band that it explains: whether this effort makes the motion.
+    `unexplained` is the mean square of the effort below `effort` [Hz] that the motion does not explain.
     """
 
     motion: float
@@ -66,6 +67,7 @@ class Bandwidth:
     left_out: float = 0.0
     left_out_to: float = 0.0
     mapped: float = 1.0
+    unexplained: float = 0.0
 
 
 def bridged(records: Sequence[Record], model: Model) -> tuple[list[Stretch], Bandwidth]:
@@ -121,11 +123,11 @@ def bandwidth_below(motions: Sequence[Motion], motion: float, dominant: float, l
     lines = _lines(motions, motion / WIDER, low)
     least = min(LOWEST * dominant, motion / WIDER)
     by_map, effort = (max(one, least) for one in _of_effort(motions, motion / WIDER, dominant, low, lines))
-    mapped, explained = _explained(motions, effort, low, lines)
+    mapped, explained, power = _explained(motions, effort, low, lines)
     if by_map != effort:
-        mapped, _ = _explained(motions, by_map, low, lines)
+        mapped, *_ = _explained(motions, by_map, low, lines)
     left_out = _left_out(motions, motion, effort)
-    return Bandwidth(motion, effort, explained, dominant, low, *left_out, mapped)
+    return Bandwidth(motion, effort, explained, dominant, low, *left_out, mapped, (1.0 - explained) * power)
 
 
 def _of_motion(raw: Stretch) -> tuple[float, float]:
@@ -165,7 +167,12 @@ def _spectrum(raw: Stretch) -> tuple[Array, Array, float]:
     frequency, power = welch(
         raw.output - raw.output.mean(), 1.0 / raw.period, nperseg=_segment(raw), detrend="linear"
     )
-    return frequency, power, float(np.median(power[len(power) // 2 :]))
+    return frequency, power, noise_floor(power)
+
+
+def noise_floor(power: Array) -> float:
+    """The floor of a power spectral density (k,): its median above half of the highest frequency."""
+    return float(np.median(power[len(power) // 2 :]))
 
 
 def noise_of_output(raw: Stretch) -> float:
@@ -290,19 +297,19 @@ def _spectra(signal: Array, motion: Motion, frequency: float) -> tuple[Array, Ar
 
 def _explained(
     motions: Sequence[Motion], frequency: float, low: float, lines: Sequence[float]
-) -> tuple[float, float]:
-    """Shares of the effort's power below the frequency that a free map alone, and the motion, explain."""
+) -> tuple[float, float, float]:
+    """Shares of the effort's power below the frequency that a free map alone, and the motion, explain; and that power, a mean square."""
     efforts, left = _residuals(motions, frequency, low, lines)
     total = sum(float(np.sum((one - np.mean(one)) ** 2)) for one in efforts)
     if total <= 0.0:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     by_map, remains = 0.0, 0.0
     for motion, residual in zip(motions, left, strict=True):
         frequencies, _, linear = _spectra(residual, motion, frequency)
         power = float(residual @ residual)
         by_map += power
         remains += max(power - len(residual) * float(frequencies[1]) * float(linear.sum()), 0.0)
-    return 1.0 - by_map / total, 1.0 - remains / total
+    return 1.0 - by_map / total, 1.0 - remains / total, total / sum(map(len, efforts))
 
 
 def _left_out(motions: Sequence[Motion], motion: float, effort: float) -> tuple[float, float]:
