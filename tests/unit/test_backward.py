@@ -1,5 +1,6 @@
 """Backward elimination tries chosen effects against being left out, and against others in their place."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -46,7 +47,9 @@ def test_effects_are_exchanged_for_those_that_scored_well_or_fit_well_alone(monk
     }
     first = Round(tuple(Score(CATALOGUE[name], guess, 50.0, 1.0) for name, guess in scored.items()), 0.0)
     trials = {one.added: one for one in (best, *alone)}
-    kept, _ = module.eliminate(best, [SERIES], CATALOGUE, trials, QUIET, 1e-3, [first], 10.0, lambda _: None)
+    kept, _ = module.eliminate(
+        best, [SERIES], CATALOGUE, trials, QUIET, 1e-3, [first], 10.0, math.inf, lambda _: None
+    )
     assert kept is best
     assert {("coulomb_friction",), ("cubic_stiffness",)} <= {one.added for one in tried}
     swapped = {name for one in tried if len(one.added) == 2 for name in one.added} - set(best.added)
@@ -74,7 +77,7 @@ def test_what_an_exchange_makes_idle_is_left_out(monkeypatch: pytest.MonkeyPatch
     guess = {p.name: 0.1 for p in CATALOGUE["quadratic_drag"].parameters}
     first = Round((Score(CATALOGUE["quadratic_drag"], guess, 50.0, 1.0),), 0.0)
     kept, _ = module.eliminate(
-        best, [SERIES], CATALOGUE, {best.added: best}, QUIET, 1e-3, [first], 10.0, lambda _: None
+        best, [SERIES], CATALOGUE, {best.added: best}, QUIET, 1e-3, [first], 10.0, math.inf, lambda _: None
     )
     assert kept.added == ("quadratic_drag",)
 
@@ -109,7 +112,7 @@ def test_models_with_one_effect_are_compared_under_one_noise(monkeypatch: pytest
     ]
     trials = {one.added: one for one in (best, *alone)}
     first = Round((), 0.0)
-    module.eliminate(best, [SERIES], CATALOGUE, trials, QUIET, 1e-3, [first], 10.0, lambda _: None)
+    module.eliminate(best, [SERIES], CATALOGUE, trials, QUIET, 1e-3, [first], 10.0, math.inf, lambda _: None)
     swapped = {name for one in tried if len(one.added) == 2 for name in one.added} - set(best.added)
     assert {"quadratic_stiffness", "quintic_stiffness"} <= swapped
     assert not {"cubic_stiffness", "bilinear_stiffness"} & swapped

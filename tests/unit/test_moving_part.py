@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import chirp, lfilter
 
 from rhythmid.identify.motion_band import bandwidth, moving_part
 from rhythmid.identify.series import dominant_frequency, prepare
@@ -50,3 +51,19 @@ def test_noise_is_no_power_of_the_motion(seed):
     noise = np.random.default_rng(seed).normal(size=len(time))
     value = np.sin(2 * np.pi * 1.7 * time) + 0.1 * noise
     assert bandwidth(value, 1e-3) < 2.5
+
+
+@pytest.mark.parametrize("colour", [0.5, 0.9, 0.97])
+@pytest.mark.parametrize("size", [0.01, 0.03, 0.1])
+def test_coloured_noise_is_no_power_of_the_motion(colour, size):
+    time = np.arange(0.0, 20.0, 1e-3)
+    noise = lfilter([1.0], [1.0, -colour], np.random.default_rng(1).normal(size=len(time)))
+    value = np.sin(2 * np.pi * 1.7 * time) + size / np.std(noise) * noise
+    assert bandwidth(value, 1e-3) < 2.5
+
+
+def test_a_broad_motion_is_not_taken_for_noise():
+    time = np.arange(0.0, 20.0, 1e-3)
+    noise = lfilter([1.0], [1.0, -0.9], np.random.default_rng(1).normal(size=len(time)))
+    value = chirp(time, 0.5, 20.0, 60.0) + 0.01 / np.std(noise) * noise
+    assert 50.0 < bandwidth(value, 1e-3) < 65.0

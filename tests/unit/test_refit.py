@@ -2,6 +2,8 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.trial import Origin, Proposal, Trial, propose
 from rhythmid.identify.descent import Descent, out_of_reach
 from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import Fit
 from rhythmid.identify.series import Series
 
 QUIET = NoiseModel(np.empty(0), 1.0)
@@ -41,6 +44,14 @@ def test_an_element_without_a_size_has_no_fainter_guesses():
     for element in sizeless:
         values = {p.name: 1.0 if p.default is None else p.default for p in element.parameters}
         assert propose(hopper(), element, [values], ()).faint == ()
+
+
+def reach_over(error) -> float:
+    """The chi2 that a model needs to compete with one that leaves these errors."""
+    run = SimpleNamespace(
+        series=[replace(STILL, time=np.arange(len(error)), value=error, used=np.ones(len(error), bool))]
+    )
+    return refit.reach_of(cast(Fit, SimpleNamespace(run=run, residuals=[error])), QUIET)
 
 
 def fitted_force(
@@ -211,3 +222,12 @@ def test_a_descent_that_would_not_come_to_where_it_matters_is_given_up() -> None
     assert not out_of_reach(100.0, 50.0, 4.0, 4.0)  # halved four times more: 3.1
     assert out_of_reach(100.0, 50.0, 3.0, 4.0)
     assert not out_of_reach(100.0, 99.0, 0.0, 100.0)  # there already
+
+
+def test_a_model_competes_if_it_is_less_than_five_standard_errors_behind() -> None:
+    noise = np.random.default_rng(0).normal(size=6400)
+    white = reach_over(noise)
+    assert white == pytest.approx(noise @ noise + 100.0, rel=1e-2)
+    # errors that last for eight samples are an eighth as many
+    lasting = np.repeat(noise[:800], 8)
+    assert reach_over(lasting) == pytest.approx(lasting @ lasting + 800.0, rel=0.1)

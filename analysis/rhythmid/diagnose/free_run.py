@@ -162,7 +162,7 @@ class _Weighing:
     @property
     def reach(self) -> float:
         """The chi2 that a model needs in order to compete."""
-        return reach_of(self.found.fit.chi2, self.found.fit.samples)
+        return reach_of(self.found.fit, self.found.noise)
 
     def skips(self, step: str, skip: bool) -> bool:
         """Whether to skip a step for lack of time; it then counts as untried."""

@@ -11,6 +11,9 @@ Array = NDArray[np.float64]
 # share of a motion's power after a Hann window (3/8 for a steady motion) below which the motion has died out
 ERASED = 0.02
 LEAST_PART = 16  # least number of samples for a spectrum
+# largest rise of the noise's power from an octave to the one below: coloured noise is taken to be of first order at most, 20 dB a decade
+RISE = 4.0
+FEWEST = 32  # number of the lowest values of a spectrum up to which the level of the noise is that above them
 
 
 def moving_part(value: Array) -> Array:
@@ -35,13 +38,29 @@ def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
     detrended = value - np.linspace(value[: max(1, n // 50)].mean(), value[-max(1, n // 50) :].mean(), n)
     length = fast_length(n)
     power = np.abs(np.fft.rfft(detrended * np.hanning(n), length)) ** 2
-    floor = np.median(power[len(power) // 2 :])  # measurement noise, from the upper half of the band
     # the power of noise at a frequency is distributed exponentially: the largest of n values is about log2(n) times their median
-    power = np.maximum(power - math.log2(len(power)) * floor, 0.0)
+    power = np.maximum(power - math.log2(len(power)) * noise_level(power), 0.0)
     total = np.cumsum(power)
     if total[-1] <= 0.0:
         return 0.5 / period
     return float(max(np.searchsorted(total, share * total[-1]), 1) / (length * period))
+
+
+def noise_level(power: Array) -> Array:
+    """Median power (n,) of the measurement noise in a spectrum (n,): octave by octave from the upper half of the band downwards.
+
+    The level of an octave is the median of its values, unless that exceeds the level of the octave above by more than noise does:
+    then the octave holds motion.
+    """
+    level = np.empty(len(power))
+    end, found = len(power), math.inf
+    while end > FEWEST or found == math.inf:
+        octave = slice(end // 2, end)
+        found = min(float(np.median(power[octave])), RISE * found)
+        level[octave] = found
+        end //= 2
+    level[:end] = found
+    return level
 
 
 def block_length(value: Array, period: float) -> int:

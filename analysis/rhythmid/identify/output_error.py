@@ -119,6 +119,7 @@ def minimise(
     edge = on_the_edge(fit.model, names, fit.covariance)
     if edge:
         put = fit.model.with_values(edge)
+        every = zip((*names, *run.compiled.layout.states), np.concatenate(fit.differences).tolist())
         try:
             end = descend(
                 put,
@@ -130,6 +131,7 @@ def minimise(
                 pool,
                 tolerance,
                 reach=fit.chi2 + FALSE_EDGE,
+                similar={name: step for name, step in every if name not in edge},
             )
         except InputError:
             # e.g. without inertia: a value far from its bound, but undetermined together with others

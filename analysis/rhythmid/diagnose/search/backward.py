@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from rhythmid.diagnose.search.refit import reach_of, run_trials, under_noise
+from rhythmid.diagnose.search.refit import run_trials, under_noise
 from rhythmid.diagnose.search.round import Round, distinct
 from rhythmid.diagnose.search.trial import Origin, Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
@@ -25,23 +25,26 @@ def eliminate(
     step: float,
     rounds: Sequence[Round],
     margin: float,
+    reach: float,
     tell: Tell,
 ) -> tuple[Trial, dict[tuple[str, ...], Trial]]:
     """Backward elimination of the added elements; returns the remaining model and all models tried.
 
     First test whether an effect can be left out. Then test replacements: a simpler member of its family or, where there are several
     effects, an element that scored well before the others were known or that fits well alone. A replacement may make other effects
-    needless. A simpler model is preferred if its criterion is worse by less than `margin`.
+    needless. A simpler model is preferred if its criterion is worse by less than `margin`. `reach` is the chi2 that a model needs to
+    compete with the `best`.
     """
     tried: dict[tuple[str, ...], Trial] = {}
+    begun = best.chi2
 
     def run(known: Trial, proposals: list[Proposal]) -> list[Trial]:
         fresh = [p for p in proposals if p.key not in tried]
         if not fresh:
             return []
         tell(f"testing {', '.join(' + '.join(p.added) for p in fresh)}")
-        reach = reach_of(known.chi2, known.samples) + margin
-        found, _ = run_trials(fresh, series, Origin.of(known), noise, step, reach=reach, tell=tell)
+        within = reach + known.chi2 - begun + margin
+        found, _ = run_trials(fresh, series, Origin.of(known), noise, step, reach=within, tell=tell)
         tried.update({t.key: t for t in found})
         return found
 

@@ -280,7 +280,7 @@ def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State
             sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
         others = [trial for trial in group if trial.added != top.added]
         settled = noise_of(fit.residuals, task.series, task.floor)
-        reach = reach_of(fit.chi2, fit.samples)
+        reach = reach_of(fit, settled)
         compared = under_noise([sought, *others, best], task.series, settled, task.step, reach=reach)
         state = state.with_trials(compared)
         winner = compared[0]
@@ -325,7 +325,8 @@ def _reduced(task: _Task, state: _State) -> _State:
     """The state after backward elimination."""
     best, noise = state.best, state.noise
     reduced, more = eliminate(
-        best, task.series, task.catalogue, state.trials, noise, task.step, state.rounds, state.margin, task.tell
+        best, task.series, task.catalogue, state.trials, noise, task.step, state.rounds, state.margin,
+        reach_of(state.current, noise), task.tell,
     )  # fmt: skip
     state = state.with_trials(list(more.values()))
     if reduced is best:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rhythmid.deadline import SPENT, time_is_up
 from rhythmid.diagnose.case import Untried
+from rhythmid.diagnose.search.score_tests import whitened
 from rhythmid.diagnose.search.trial import (
     FAINTER,
     Origin,
@@ -33,6 +34,7 @@ from rhythmid.identify.record_scales import scales
 from rhythmid.identify.sample_clock.clock import has_clock
 from rhythmid.identify.sample_clock.tick_scan import scanned
 from rhythmid.identify.series import Series
+from rhythmid.identify.student import autocorrelation_time
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
 from rhythmid.progress import Tell, counted, silent
@@ -45,10 +47,9 @@ CARRIED_ON = 0.3  # share of the spread of chi2 up to which a model is fitted to
 LITTLE = 0.5
 HOPS = 12  # largest number of hops from one minimum to the next
 HOP_DISTANCES = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # lengths of a hop, times the distance between minima
-# excess of chi2 over that of the best model, per sample, beyond which a model cannot compete on unseen data either: a loss in log
-# likelihood of a twentieth per sample, while a few per record decide
-EXCESS = 0.1
-LEAST_EXCESS = 60.0  # smallest excess, for few samples
+CONCLUSIVE = (
+    5.0  # standard errors behind the best model from which another cannot compete on unseen data either
+)
 # largest number of halvings of the longest step, over all checks of a run: from samples 20 ms apart to 0.3 ms. An error that remains
 # is not due to integration but to jumps, such as a dead band's, whose instants change with every step
 MOST_HALVINGS = 6
@@ -83,9 +84,17 @@ def _descent(
     return descend(model, run, names, noise, starts, iterations, None, TOLERANCE, differences, reach, similar)
 
 
-def reach_of(chi2: float, samples: int) -> float:
-    """Chi2 that a model must reach to compete with the best one, whose `chi2` was obtained with `samples` samples."""
-    return chi2 + max(LEAST_EXCESS, EXCESS * samples)
+def reach_of(best: Fit, noise: NoiseModel) -> float:
+    """Chi2 under a noise model that a model must reach to compete with the best one.
+
+    If the best model is true, and another one's predictions differ from its by D (sum of squares in units of the noise), chi2 rises by
+    D, with a standard deviation of 2 √(D t). Here t is the autocorrelation time of the best model's errors: 1 for noise, longer for motion
+    that the model does not explain.
+    """
+    white = whitened(best, best.residuals, noise)
+    record = np.repeat(np.arange(len(white)), [len(one) for one in white])
+    error = np.concatenate(white)
+    return float(error @ error) + (2.0 * CONCLUSIVE) ** 2 * autocorrelation_time(error, record)
 
 
 def _fit_proposal(
@@ -139,7 +148,7 @@ def _fit_proposal(
     flat = _flat(best.model, best.differences[0], guessed)
     if flat and not time_is_up():
         back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
-        again = _descent(back, run, noise, best.starts, BRIEF, similar=_steps(best, run, flat))
+        again = _descent(back, run, noise, best.starts, BRIEF, similar=_steps(best, run, flat), reach=reach)
         best = min(best, again, key=lambda end: end.chi2)
     return outcome_of(best, run, noise)
 

@@ -13,6 +13,7 @@ from rhythmid.diagnose.free_functions import filtered
 from rhythmid.diagnose.search.score_tests import (
     Change,
     Score,
+    Trajectories,
     best_changes,
     changes_of,
     guesses,
@@ -123,7 +124,7 @@ def one_round(
 
     Otherwise a missing effect, such as a slow drift, would be taken for coloured noise, in later rounds as in the first.
     """
-    noise = noise_without(fit, changes_at(fit, catalogue, pool), _filters(fit, pool))
+    noise = _noise_left(fit, catalogue, pool)
     if fit.nrmse() > MISFIT and noise.is_structure:
         noise = NoiseModel(np.empty(0), noise.variance**0.5)
     give_back()
@@ -134,14 +135,20 @@ def one_round(
 
 def changes_at(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> Iterator[Change]:
     """Changes of the output by all first guesses of the catalogue, linearised at the fit."""
+    return _changes_along(trajectories(fit), catalogue, pool)
+
+
+def _changes_along(
+    known: Trajectories, catalogue: Catalogue, pool: ThreadPoolExecutor | None
+) -> Iterator[Change]:
+    return changes_of(known, guesses(catalogue, known.fit.model, sizes_along(known)), pool)
+
+
+def _noise_left(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> NoiseModel:
+    """Noise model of a fit's residual without what the catalogue and linear filters of velocity and actuator force explain."""
     known = trajectories(fit)
-    return changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
-
-
-def _filters(fit: Fit, pool: ThreadPoolExecutor | None) -> Iterator[tuple[Array, ...]]:
-    """Changes of the output by linear filters of the past velocity and actuator force at a fit, computed on demand."""
-    for one in filtered(trajectories(fit), pool):
-        yield from one.columns
+    filters = (columns for one in filtered(known, pool) for columns in one.columns)
+    return noise_without(fit, _changes_along(known, catalogue, pool), filters)
 
 
 def not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[Untried]:
@@ -168,7 +175,7 @@ def scored_in_windows(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor |
     try:
         run = prepare_run(fit.model, cut, fit.run.max_step)
         local = minimise(fit.model, run, fit.names, _within(fit.noise, cut), None, 10, pool)
-        noise = _within(noise_without(local, changes_at(local, catalogue, pool), _filters(local, pool)), cut)
+        noise = _within(_noise_left(local, catalogue, pool), cut)
         local = under(local, noise, pool)
         return score(local, changes_at(local, catalogue, pool))
     except InputError:

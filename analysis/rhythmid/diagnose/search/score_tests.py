@@ -312,9 +312,12 @@ def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change]
     left, made_by = parameter_basis(fit)
     residual = fit.linearisation.residual
     residual = residual - left @ (left.T @ residual)
+    parts = [(series, series.stretches(fit.noise)) for series in fit.run.series]
     for one in changes:
         with np.errstate(over="ignore", invalid="ignore"):  # changes that overflow in whitening are left out
-            white = whitened(fit, one.outputs, fit.noise)
+            white = [
+                series.whitened(fit.noise, given, part) for (series, part), given in zip(parts, one.outputs)
+            ]
             raw = math.sqrt(sum(float(w @ w) for w in white))
             joined = fit.linearisation.without_starts(white)
             change = joined - left @ (left.T @ joined)

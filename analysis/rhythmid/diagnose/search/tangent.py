@@ -4,6 +4,7 @@ It is the derivative of the numerical solution, by finite differences over one i
 motion (F. Rabier, P. Courtier, Q. J. R. Meteorol. Soc. 118 (1992) 649, linearise along a trajectory in the same way).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,22 +62,21 @@ def tangent(run: FreeRun, model: Model, index: int, states: Array, force: float)
     maps, ends = np.empty((len(times) - 1, q + 1, q + 2)), np.empty((2, q + 2))
     direct = 0.0
 
-    def end(k: int, start: Array, disturbance: Pieces) -> Array:
-        given.compiled.run(
-            times[k : k + 2], *command.at(k), *forcing.at(k), *disturbance,
-            given.parameters, start, run.max_step, ends,
-        )  # fmt: skip
+    def end(begun: Sequence[Array], start: Array, disturbance: Pieces) -> Array:
+        given.compiled.run(*begun, *disturbance, given.parameters, start, run.max_step, ends)
         return ends[1, : q + 1]
 
     for k in range(len(times) - 1):
-        start = states[k].copy()
-        base, first = end(k, start, NO_SIGNAL).copy(), ends[0, q]
+        start, begun = states[k].copy(), (times[k : k + 2], *command.at(k), *forcing.at(k))
+        base, first = end(begun, start, NO_SIGNAL).copy(), ends[0, q]
         for i in range(q):
             start[i] = states[k, i] + moved[i]
-            maps[k, :, i] = (end(k, start, NO_SIGNAL) - base) / moved[i]
+            maps[k, :, i] = (end(begun, start, NO_SIGNAL) - base) / moved[i]
             start[i] = states[k, i]
         for i, values in enumerate(((pushed, 0.0), (0.0, pushed))):
-            maps[k, :, q + i] = (end(k, start, _straight(times[k], times[k + 1], *values)) - base) / pushed
+            maps[k, :, q + i] = (
+                end(begun, start, _straight(times[k], times[k + 1], *values)) - base
+            ) / pushed
             if k == i == 0:
                 direct = (ends[0, q] - first) / pushed
     return Tangent(maps, direct) if np.isfinite(maps).all() else None
