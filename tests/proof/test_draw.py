@@ -2,11 +2,13 @@
 
 from collections import Counter
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from machines import hopper
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
@@ -17,10 +19,11 @@ from rhythmid.proof.concealment import (
     MOST_EFFORT,
     NULL_CLUTTER_MOST,
     STRONGEST,
+    Concealed,
 )
-from rhythmid.proof.draw import LACKED, absent_with, candidates, draw_case, related
+from rhythmid.proof.draw import LACKED, _conceal, absent_with, candidates, draw_case, related
 from rhythmid.proof.equations import EQUATIONS, FOREIGN
-from rhythmid.proof.machine import TIMING
+from rhythmid.proof.machine import TIMING, Effect
 from rhythmid.proof.machines.designs import DESIGNS
 from rhythmid.proof.machines.hopper import LONGEST_DELAY
 from rhythmid.proof.noise import NOISES, Log, draw_log, draw_noise
@@ -98,6 +101,27 @@ def test_pairs_are_of_different_families(catalogue, monkeypatch):
         names: Any = draw_case(6, "pairs", index, catalogue)
         first, second = names
         assert not related(catalogue, first, second)
+
+
+@pytest.mark.parametrize(("beside", "drawn"), [(0.004, False), (0.006, True)])
+def test_each_effect_of_a_pair_is_of_practical_size_beside_the_other(monkeypatch, catalogue, beside, drawn):
+    """0.4 % of the motion is seen here, at twice the noise, but the diagnosis need not name it."""
+    noise = 0.002
+    stick: Any = SimpleNamespace(
+        by_effort=False, noise=noise, least=LEAST_MOTION, exact=hopper(), ratio=lambda *_: beside / noise
+    )
+    effects = {
+        "quadratic_drag": Effect("quadratic_drag", {"coefficient": 0.1}),
+        "coulomb_friction": Effect("coulomb_friction", {"force": 0.1}),
+    }
+    monkeypatch.setattr(
+        "rhythmid.proof.draw.sized_effect", lambda _, name, *__: Concealed(effects[name], 4.0)
+    )
+    rig: Any = SimpleNamespace(lacks=None)
+    motion: Any = None
+    monkeypatch.setattr("rhythmid.proof.draw.SIZES", dict.fromkeys(effects, lambda *_: None))
+    made = _conceal(tuple(effects), rig, stick, motion, catalogue, np.random.default_rng(0))
+    assert (made is not None) == drawn
 
 
 def test_what_contains_or_equals_an_effect_leaves_the_catalogue_with_it(catalogue):

@@ -128,6 +128,33 @@ def test_effort_is_compared_at_the_delays_that_the_motion_shows(monkeypatch):
     assert nominal.mass == hopper().mass
 
 
+@pytest.mark.parametrize("verdict", ["undecided", "unknown_physics", "consistent", "missing_physics"])
+def test_effort_is_asked_where_a_free_run_leaves_open_what_is_missing(monkeypatch, verdict):
+    asked: list[str] = []
+
+    def answer(found: Diagnosis) -> Answer:
+        return Answer(found, hopper(), SimpleNamespace())  # type: ignore[arg-type]
+
+    def effort(*_):
+        asked.append("effort")
+        return answer(diagnosed("missing_physics", "coulomb_friction", kind="effort"))
+
+    def motion(*_, windows: bool):
+        assert not windows
+        yield answer(diagnosed(verdict, "second_mode"))
+
+    able = SimpleNamespace(
+        applies=True, effort_share=0.5, free_run_means_something=True, band_left_out=False, notes=()
+    )
+    monkeypatch.setattr(module, "applicable", lambda *_: able)
+    monkeypatch.setattr(module, "_by_motion", motion)
+    monkeypatch.setattr(module, "_by_effort", effort)
+    found = diagnose(RECORD, hopper(), catalogue=CATALOGUE).diagnosis
+    open_end = verdict in ("undecided", "unknown_physics")
+    assert (found.scoring.kind == "effort") == open_end
+    assert bool(asked) == (verdict != "consistent")  # beside stated names it is compared
+
+
 def test_one_way_to_score_is_compared_with_nothing(monkeypatch):
     assert answered(monkeypatch, FRICTION) == (FRICTION, [])
     assert answered(monkeypatch, QUIET, by_effort=FRICTION) == (QUIET, [])

@@ -149,6 +149,27 @@ def test_kin_begin_where_the_family_has_ended(monkeypatch, plain):
     assert any(guess.get("sensor_lag.time_constant") == LAG["time_constant"] for guess in kin.guesses)
 
 
+def test_kin_begin_where_they_have_ended_alone_with_the_values_that_the_model_had_there(monkeypatch, plain):
+    kept: list[Proposal] = []
+
+    def run_trials(proposals, *_, **__):
+        kept.extend(proposals)
+        return [], []
+
+    monkeypatch.setattr(module, "run_trials", run_trials)
+    base = search_of(plain).best
+    alone = search_of(lagging(plain, "sensor_lag"), "sensor_lag").best
+    values = {"sensor_lag.time_constant": 0.07, "linear_spring.stiffness": 12.0}
+    weighed = [base, replace(alone, model=alone.model.with_values(values))]
+    series, known = list(plain.run.series), trajectories(plain)
+    friction = plain.model.with_element(CATALOGUE["coulomb_friction"], {"force": 0.01})
+    both = lagging(replace(plain, model=friction), "actuator_lag")
+    chosen = replace(search_of(both, "coulomb_friction", "actuator_lag").best, differences=None)
+    alternatives(base, chosen, series, CATALOGUE, NOISE, 1e-3, known, rounds_of(plain), weighed)
+    (made,) = (one for one in kept if set(one.added) == {"coulomb_friction", "sensor_lag"})
+    assert any(values.items() <= guess.items() for guess in made.guesses)
+
+
 def test_a_law_that_needs_the_effect_whose_place_it_would_take_is_not_proposed(monkeypatch, plain):
     play = Score(CATALOGUE["freeplay"], {"gap": 1e-3}, 50.0, 1.0)
     assert play.element.family == CATALOGUE["linear_spring"].family

@@ -60,6 +60,32 @@ def test_effects_are_exchanged_for_those_that_scored_well_or_fit_well_alone(monk
     assert gone.guesses[0]["linear_spring.stiffness"] == 150.0
 
 
+def test_what_scored_well_begins_where_it_ended_alone_though_others_fit_better(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """A pendulum's gravity added to a spring that contains it already ends in another minimum."""
+    tried = []
+
+    def run_trials(proposals, *_, **__):
+        tried.extend(proposals)
+        return [], []
+
+    monkeypatch.setattr(module, "run_trials", run_trials)
+    monkeypatch.setattr(module, "under_noise", lambda trials, *_: list(trials))
+    best = trial(100.0, 200.0, coulomb_friction={"force": 1.0}, cubic_stiffness={"coefficient": 10.0})
+    alone = [
+        trial(300.0, 150.0, quintic_stiffness={"coefficient": 3.0}),
+        trial(400.0, 160.0, quadratic_drag={"coefficient": 0.1}),
+        trial(900.0, 5.0, quadratic_stiffness={"coefficient": 3.0}),
+    ]
+    first = Round((Score(CATALOGUE["quadratic_stiffness"], {"coefficient": 0.1}, 50.0, 1.0),), 0.0)
+    trials = {one.added: one for one in (best, *alone)}
+    module.eliminate(best, [SERIES], CATALOGUE, trials, QUIET, 1e-3, [first], 10.0, lambda _: None)
+    (made,) = (one for one in tried if one.added == ("coulomb_friction", "quadratic_stiffness"))
+    assert made.guesses[0]["quadratic_stiffness.coefficient"] == 3.0
+    assert made.guesses[0]["linear_spring.stiffness"] == 5.0
+
+
 def test_what_an_exchange_makes_idle_is_left_out(monkeypatch: pytest.MonkeyPatch):
     ends = {
         ("coulomb_friction", "quadratic_drag"): trial(

@@ -17,7 +17,7 @@ from rhythmid.diagnose.answer.compose import MORE_TIME
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.case import EXPLAINED, Budget
 from rhythmid.diagnose.contenders import contend, rows_of
-from rhythmid.diagnose.diagnosis import diagnose
+from rhythmid.diagnose.diagnosis import BY_EFFORT, diagnose
 from rhythmid.diagnose.effort import search
 from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.diagnose.search.trial import Trial
@@ -58,8 +58,8 @@ def by_effort() -> Diagnosis:
 
 def test_by_motion_a_budget_that_is_spent_at_once_tells_elements_and_other_explanations(monkeypatch):
     spent(monkeypatch, True)
-    *elements, others = cut_off(by_motion())
-    assert "coulomb_friction" in elements and "freed values" in others
+    *elements, others, effort = cut_off(by_motion())
+    assert "coulomb_friction" in elements and "freed values" in others and effort == BY_EFFORT
 
 
 @pytest.mark.parametrize("scored", ["by_motion", "by_effort"])

@@ -80,9 +80,10 @@ def alternatives(
     kept: dict[tuple[str, ...], tuple[Proposal, Kind]] = {
         one.key: (one, kind) for kind, group in made.items() for one in group
     }
-    if not kept:
+    known_keys = {trial.key for trial in weighed}
+    given = [one for one, _ in kept.values() if one.key not in known_keys]
+    if not given:
         return []
-    given = [one for one, _ in kept.values()]
     trials, _ = run_trials(given, series, Origin.of(chosen), noise, step, reach=reach, tell=tell)
     return [(trial, kept[trial.key][1]) for trial in trials]
 
@@ -108,7 +109,8 @@ def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Tri
     """The base model with other elements of the family of `term`.
 
     Only elements that scored in some round, that are no hypothesis yet and that need nothing that the base model lacks are
-    proposed. The first guesses include the fitted values of the other members of the family.
+    proposed. The first guesses include the fitted values of the other members of the family, and those of the element alone:
+    it may need other values of the model's own parameters. A spring, for example, contains a pendulum's gravity.
     """
     family = term.element.family
     scored: dict[str, list[Score]] = {}
@@ -128,10 +130,13 @@ def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Tri
             continue
         made = propose(base.model, element, [one.start for one in scores[:2]], base.added)
         own = made.added[-1]
+        known_ends = [
+            (label, trial) for label, trial in places.items() if trial.element(label).family == family
+        ]
+        known_ends += [(trial.added[0], trial) for trial in weighed if trial.names == (name,)]
         ends = [
             {_renamed(key, label, own): value.value for key, value in trial.model.parameters.items()}
-            for label, trial in places.items()
-            if trial.element(label).family == family
+            for label, trial in known_ends
         ]
         known = set(made.model.parameters)
         nearer = tuple({key: value for key, value in end.items() if key in known} for end in ends)

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.admission import Admitted, admitted
-from rhythmid.diagnose.agreement import HOW, contradictions, tells_all
+from rhythmid.diagnose.agreement import HOW, UNSETTLED, contradictions, tells_all
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
@@ -291,10 +291,10 @@ def _answers(
     """Answers of all applicable scoring modes, the most informative first, computed on demand.
 
     A free run that follows the machine comes first, unless the machine is quasi-static or the effort has more noise than the
-    motion. Otherwise effort comes first where it is at least as large as the inertial force, because it then moves the machine against other forces. Windows come first
-    where the machine swings by itself, and where a band with much of the effort cannot be compared by effort. Effort is scored
-    on the `whole` case, whose records are not cut. After a first answer no further mode begins once the budget is spent; the next
-    mode is then added to `untried`.
+    motion; effort follows where the free run leaves open what is missing. Otherwise effort comes first where it is at least as
+    large as the inertial force, because it then moves the machine against other forces. Windows come first where the machine
+    swings by itself, and where a band with much of the effort cannot be compared by effort. Effort is scored on the `whole` case,
+    whose records are not cut. After a first answer no further mode begins once the budget is spent; it is then added to `untried`.
     """
     effort_notes = (*given.whole_notes, *effort.notes)
     driven = effort.applies and effort.effort_share >= DRIVES_IT and not effort.band_left_out
@@ -316,11 +316,12 @@ def _answers(
     if first or not effort.applies:
         yield from by_motion(windows=True)
         return
-    told = 0
-    for answer in by_motion(windows=False):
-        told += 1
-        yield answer
-    if told:
+    last = None
+    for last in by_motion(windows=False):
+        yield last
+    if last is not None:
+        if last.diagnosis.verdict in UNSETTLED and not late(BY_EFFORT):
+            yield _by_effort(whole, effort, effort_notes)
         return
     if driven:
         yield _by_effort(whole, effort, effort_notes)

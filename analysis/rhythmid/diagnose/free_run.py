@@ -28,7 +28,7 @@ from rhythmid.diagnose.location import Dependence, dependences
 from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.refitted_map import refitted_map
 from rhythmid.diagnose.scoring import Scoring
-from rhythmid.diagnose.search.forward import Search, search
+from rhythmid.diagnose.search.forward import EFFECTS_AT_ONCE, Search, search
 from rhythmid.diagnose.search.refit import reach_of, whole_fit
 from rhythmid.diagnose.search.score_tests import (
     Trajectories,
@@ -100,8 +100,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     trial = _trial_of(select(weighing.contest(contenders, run)).chosen, contenders)
     if trial.key != found.best.key:
         run = weighing.run_of(trial)
-    more, uncompared = weighing.of_other_kinds(trial, run, contenders)
-    contenders += more
+    trial, run, contenders, uncompared = weighing.with_other_kinds(trial, run, contenders)
     case.tell("locating what is left")
     began = time.monotonic()
     after = before = dependences(run, weighing.rows, case.pool)
@@ -213,6 +212,25 @@ class _Weighing:
             structured_after=found.noise.predictable,
             uncompared=uncompared,
         )
+
+    def with_other_kinds(
+        self, chosen: Trial, run: Trajectories, contenders: list[Contender]
+    ) -> tuple[Trial, Trajectories, list[Contender], bool]:
+        """The chosen trial, its run, and the contenders with those of other kinds; whether the budget ended before all were compared.
+
+        If a related law takes the place of an effect, the laws related to the others are tried beside it: with two wrong laws,
+        exchanging only one of them may not pay.
+        """
+        uncompared = False
+        for _ in range(EFFECTS_AT_ONCE):
+            more, uncompared = self.of_other_kinds(chosen, run, contenders)
+            contenders = [*contenders, *more]
+            best = select(self.contest(contenders, run)).chosen
+            if uncompared or best.kind != "effects" or best.key == chosen.key:
+                break
+            chosen = _trial_of(best, contenders)
+            run = self.run_of(chosen)
+        return chosen, run, contenders, uncompared
 
     def of_other_kinds(
         self, chosen: Trial, run: Trajectories, contenders: Sequence[Contender]

@@ -10,7 +10,6 @@ import numpy as np
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.model import Model
 from rhythmid.proof.concealment import (
-    FAINTEST,
     MOST_EFFORT,
     STRONGEST,
     Concealed,
@@ -253,6 +252,6 @@ def _conceal(
     for effect in added if len(added) > 1 and not stick.by_effort else ():  # one effect may mask the other
         beside = next(other for other in added if other is not effect)
         known = stick.exact.with_element(catalogue[beside.name], beside.parameters)
-        if stick.ratio(added, known) < FAINTEST:
+        if stick.ratio(added, known) < least:
             return None
     return tuple(concealed)

@@ -91,7 +91,7 @@ def _swaps(
         family = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
         names = set(family)
         if len(best.added) > 1:
-            names |= scored | set(alone)
+            names |= scored | set(list(alone)[:RIVALS_TRIED])
         slim = best.model.pruned(label)
         rest = _rest(best, slim)
         for name in sorted(names - {best.element(other).name for other in best.added}):
@@ -103,7 +103,8 @@ def _swaps(
                 starts.insert(0, starts[0] | {key: value for key, value in values if key in own})
             elif tuple(sorted((*rest, name))) in trials:
                 continue
-            elif name in alone:  # the fit with this effect alone also gives the other parameters
+            elif name in alone:
+                # the fit with this effect alone also gives the other parameters: a spring, for example, contains a pendulum's gravity
                 starts, beside = [_values(alone[name], name), *starts], [_given(alone[name], slim)]
             if starts:
                 swaps.append(propose(slim, catalogue[name], starts, rest, beside=beside))
@@ -111,8 +112,8 @@ def _swaps(
 
 
 def _alone(single: Sequence[Trial]) -> dict[str, Trial]:
-    """The best models with one effect, by its name, from models sorted by fit under one noise model."""
-    named = [(trial.element(trial.added[0]).name, trial) for trial in single[:RIVALS_TRIED]]
+    """The models with one effect, by its name, best first; from models sorted by fit under one noise model."""
+    named = [(trial.element(trial.added[0]).name, trial) for trial in single]
     return {name: trial for name, trial in named if name == trial.added[0]}
 
 
