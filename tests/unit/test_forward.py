@@ -73,6 +73,7 @@ def found(
         "eliminate": lambda best, *_: (best, {}), "felt_starts": lambda *_: None, "start_cost": lambda _: 0.0,
         "under": lambda fit, *_: fit, "not_tried": lambda *_: [], "_could_pay": lambda *_: True,
         "Origin": SimpleNamespace(of=lambda trial: None), "fine_enough": lambda run, *_: run,
+        "reach_of": lambda *_: np.inf,
     }  # fmt: skip
     for name, fake in replaced.items():
         monkeypatch.setattr(module, name, fake)
