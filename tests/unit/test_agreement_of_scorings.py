@@ -144,7 +144,12 @@ def test_effort_is_asked_where_a_free_run_leaves_open_what_is_missing(monkeypatc
         yield answer(diagnosed(verdict, "second_mode"))
 
     able = SimpleNamespace(
-        applies=True, effort_share=0.5, free_run_means_something=True, band_left_out=False, notes=()
+        applies=True,
+        effort_share=0.5,
+        free_run_means_something=True,
+        band_left_out=False,
+        noisier=False,
+        notes=(),
     )
     monkeypatch.setattr(module, "applicable", lambda *_: able)
     monkeypatch.setattr(module, "_by_motion", motion)
