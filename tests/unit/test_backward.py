@@ -80,7 +80,7 @@ def test_what_scored_well_begins_where_it_ended_alone_though_others_fit_better(
     ]
     first = Round((Score(CATALOGUE["quadratic_stiffness"], {"coefficient": 0.1}, 50.0, 1.0),), 0.0)
     trials = {one.added: one for one in (best, *alone)}
-    module.eliminate(best, [SERIES], CATALOGUE, trials, QUIET, 1e-3, [first], 10.0, lambda _: None)
+    module.eliminate(best, [SERIES], CATALOGUE, trials, QUIET, 1e-3, [first], 10.0, math.inf, lambda _: None)
     (made,) = (one for one in tried if one.added == ("coulomb_friction", "quadratic_stiffness"))
     assert made.guesses[0]["quadratic_stiffness.coefficient"] == 3.0
     assert made.guesses[0]["linear_spring.stiffness"] == 5.0
