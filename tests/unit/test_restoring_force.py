@@ -52,7 +52,8 @@ def test_a_motion_that_never_comes_back_shows_no_stiffness():
         sizes = scales([turning(speed)], free())
         found = candidates(CATALOGUE, free().setting, sizes)
         assert sizes.comes_back is shown
-        assert (found.not_tried.get("cubic_stiffness") == ONE_WAY) is not shown
+        for name in ("cubic_stiffness", "position_dependent_damping"):
+            assert (found.not_tried.get(name) == ONE_WAY) is not shown
     held = free().with_element(CATALOGUE["linear_spring"], {"stiffness": 5.0})
     never = scales([turning(np.exp(-TIME))], held)
     assert "cubic_stiffness" not in candidates(CATALOGUE, held.setting, never).not_tried

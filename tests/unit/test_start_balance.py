@@ -247,3 +247,15 @@ def test_a_sensor_of_angle_that_is_off_centre_is_no_gravity(tmp_path, gravity, o
     angle = turning(gravity, off_centre, 0.03 if gravity else 0.1)
     np.savez(tmp_path / "run.npz", t=TIME, joint_angle=angle)
     assert ("pendulum_gravity" in labels(start([tmp_path / "run.npz"]))) is named
+
+
+def test_gravity_of_an_angle_is_not_guessed_where_nothing_drives_a_machine_that_turns_one_way(tmp_path):
+    """A weight on a drum turns a frame by less than a turn: its torque is constant."""
+    time = np.arange(0.0, 1.2, 0.02)
+    pulled, damping = 4.0, 0.3
+    angle = pulled / damping * (time - (1.0 - np.exp(-damping * time)) / damping)
+    noisy = 1.1 + angle + 1e-3 * np.random.default_rng(2).standard_normal(len(time))
+    np.savez(tmp_path / "run.npz", **{"t [s]": time, "angle [rad]": noisy})
+    found = start([tmp_path / "run.npz"])
+    assert labels(found) == {"constant_force", "viscous_damper"}
+    assert found.nominal.model.value("constant_force.force") == pytest.approx(pulled, rel=0.3)

@@ -103,7 +103,7 @@ def _unsuitable(element: Element, setting: Setting, scales: Scales) -> str | Non
     # what it does comes back with each turn
     turns = element.rotational and scales.high - scales.low >= 2.0 * math.pi
     one_way = not (setting.restored or scales.comes_back or turns)
-    if element.family == STIFFNESS and one_way:
+    if (element.family == STIFFNESS or element.placed) and one_way:
         return ONE_WAY
     if scales.idle and scales.once and one_way and (element.states or element.family == DRIFT):
         return DYING

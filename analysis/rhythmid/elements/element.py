@@ -173,7 +173,8 @@ class Element:
     `special_case_of` names more general elements that contain this one, exactly or in a limit of their parameters.
     `confusable` maps another element's name to an experiment or property that distinguishes the two. A `rotational`
     effect needs an angle for x, a `controlled` one a controller in the model, one of a `displaced_base` an input
-    that moves the base. A `reversing` one is told from dry friction by what follows a reversal of the motion alone. `ranges` limits parameters, by the record's scales, to values for which the element's name
+    that moves the base. A `reversing` one is told from dry friction by what follows a reversal of the motion alone. A `placed`
+    one changes with the position by a slow law, as every stiffness does. `ranges` limits parameters, by the record's scales, to values for which the element's name
     applies: a ripple repeats within the travel, otherwise it is only another spring. `hops` is the largest distance
     of the local minima of a fit in a parameter. `needless_with` names elements, or as "element.parameter" estimated
     parameters, beside which this element adds nothing to another candidate or to the nominal model. `against` says
@@ -226,6 +227,7 @@ class Element:
     # (**parameters) -> names and sizes of other elements that together give the same force while the machine moves
     moving_as: Callable[..., tuple[tuple[str, float], ...]] | None = None
     reversing: bool = False  # is told from dry friction by the way after a reversal of the motion alone
+    placed: bool = False  # follows a slow law of the position, though it is no stiffness
     # changes with time what the drive passes through: a gain that fades, a clock, a delay
     drifts: bool = False
     starts: Callable[[Scales], list[dict[str, float]]] | None = None

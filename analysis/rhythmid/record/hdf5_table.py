@@ -11,6 +11,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
 from rhythmid.record.matlab_objects import complaint_of_objects
 from rhythmid.record.own_process import arrays_in_own_process
+from rhythmid.record.simulink_stream import logged_signals
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 STARTS = (0, 512)  # offsets at which HDF5 may begin: MATLAB writes its own header first
@@ -46,6 +47,7 @@ def read_hdf5(path: Path) -> dict[str, NDArray[Any]]:
         reader = _Reader(largest(path.stat().st_size))
         with h5py.File(path, "r") as file:
             reader.take_all("", file)
+            reader.found |= logged_signals(file, reader.left)
         if reader.objects and not reader.found:
             raise ValueError(complaint_of_objects(reader.objects))
         return reader.found

@@ -119,7 +119,7 @@ def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: boo
 
     The integral of a speed drifts. In full turns gravity has to explain clearly more even beside a sensor that is off centre. Gravity depends on the absolute angle, which the integral does not give; a
     spring is identifiable from it only where the motion returns, and so it is where nothing drives the machine: along a motion of
-    one direction it is told neither from damping nor from a push. Each force has to explain clearly more even beside dry
+    one direction it is told neither from damping nor from a push, and no more is gravity's sine within a turn. Each force has to explain clearly more even beside dry
     friction, which every machine may have: a spring partly absorbs it, and in a motion of one direction a constant is the same,
     but would move the machine where it rests. Where friction is the better of the two, it is in the law and no kind of its own.
     """
@@ -136,6 +136,8 @@ def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: boo
     if rotary and measured and rows.span >= 2.0 * LEAST_SWING:
         options["pendulum"] = rows.fit([*moving, "sine", *(["cosine"] if level else [])], delay)
     driven = any(one.input is not None or one.effort is not None for one in records)
+    if "pendulum" in options and not (driven or rows.comes_back or rows.span >= 2.0 * math.pi):
+        del options["pendulum"]
     if "pendulum" in options and rows.span >= 2.0 * math.pi:
         off, both = (
             rows.fit([*one.coefficients, *OFF_CENTRE], delay) for one in (plain, options["pendulum"])

@@ -31,7 +31,8 @@ LEAST_DAMPING = 0.01
 class Nominal:
     """A model to start with, the reason for its inertia and each of its terms (by label), what could not be
     guessed, and doubts (by label). `explained` is the share of the driving signal that a balance of forces explains, None without
-    one. The values are those of the channels with the `corrections`."""
+    one. The values are those of the channels with the `corrections`. `massless` says that a spring and a damper explain as
+    much without the inertia."""
 
     model: Model
     reasons: dict[str, str]
@@ -39,6 +40,7 @@ class Nominal:
     doubts: dict[str, str] = field(default_factory=dict)
     explained: float | None = None
     corrections: tuple[Correction, ...] = ()
+    massless: bool = False
 
 
 def nominal_of(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
@@ -110,7 +112,9 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
     if not corrections and not rows.steady:
         shifted = offset_of(records, driver, units.force, kind)
         corrections = () if shifted is None else (shifted,)
-    return Nominal(model, reasons | more, tuple(remarks), doubts, 1.0 - law.left, corrections)
+    rest = [name for name in law.coefficients if name != "acceleration"]
+    massless = kind == "spring" and not law.earns_place(rows.fit(rest, law.delay))
+    return Nominal(model, reasons | more, tuple(remarks), doubts, 1.0 - law.left, corrections, massless)
 
 
 def _doubt_of_delay(delay: float, few: float) -> dict[str, str]:

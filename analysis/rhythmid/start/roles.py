@@ -35,6 +35,7 @@ from rhythmid.start.targets import with_targets
 from rhythmid.start.unnamed_joints import column_groups
 from rhythmid.start.unnamed_reference import with_reference
 from rhythmid.start.unsigned_effort import without_unsigned
+from rhythmid.start.written_twice import written_once
 
 INTEGRAL = 0.9  # correlation above which a position and a velocity belong together
 PER_MINUTE = 0.02  # by which a ratio of one to sixty may be off: that of degrees is 5 % off
@@ -69,7 +70,7 @@ def guess_roles(
     known = [
         Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one) and not _is_clock(one)
     ]
-    known = without_slopes(with_symbols(_without_empty_letters(known)))
+    known, twice = written_once(without_slopes(with_symbols(_without_empty_letters(known))))
     everything = [*known, *(Known(one, meaning_of(one)) for one in found.constant)]
     known, resting = (with_targets(part, everything) for part in (known, everything[len(known) :]))
     if not known:
@@ -83,12 +84,12 @@ def guess_roles(
     everything = known
     known = [one for one in known if chosen.includes(one.one, one.meaning)]
     if carried is not None:
-        notes = []
+        notes = [*twice]
         output = Choice(carried.driven, f"a measured position: {carried.reason}", (carried.driver,))
     else:
         output, known = _output(known, ask, str(found.path), found.constant, chosen)
         output, known, exchanged = by_direction(output, known)
-        notes = [*exchanged]
+        notes = [*twice, *exchanged]
     choices = {"output": output}
     own = next(one for one in known if one.one is output.recorded)
     measured = own.quantity or "position"

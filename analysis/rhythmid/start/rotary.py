@@ -4,7 +4,7 @@ from rhythmid.record.inventory import Recorded
 from rhythmid.start.meaning import ELECTRICAL, force_unit_of, meaning_of, words_of
 
 ROTARY = frozenset(
-    "angle angles theta phi alpha torque torques tor torq tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
+    "angle angles angular theta phi alpha torque torques tor torq tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
     "qpos qvel knee hip ankle thigh calf shoulder elbow wrist arm pan tilt roll pitch yaw pendulum winkel drehmoment drehzahl angulo "
     "angolo couple coppia odrv odrive moteus dynamixel dxl rotor".split()
 )

@@ -27,10 +27,12 @@ from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.named_joints import with_joints
 from rhythmid.start.no_motion import NoMotionError
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
+from rhythmid.start.one_force_unit import by_command_alone
 from rhythmid.start.other_effort import by_other_effort
 from rhythmid.start.role_choice import Ask, Choice
 from rhythmid.start.roles import Roles, first_answer, guess_roles
 from rhythmid.start.sides import with_sides
+from rhythmid.start.untold_motion import by_simpler_motion
 from rhythmid.start.yaml_text import GUESSED, as_guessed, clock_of, doubt_of_sign, model_yaml, signals_yaml
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
@@ -272,6 +274,8 @@ def start(
         return _nominal(moving, changed.signals, roles, known)
 
     roles, nominal = by_other_effort(guessed.inventory, guessed.roles, tried(guessed.roles), tried)
+    roles, nominal = by_command_alone(roles, nominal, tried)
+    roles, nominal = by_simpler_motion(roles, nominal, tried)
     for _ in range(MOST_CORRECTIONS):
         if nominal.corrections:
             roles = corrected(roles, nominal.corrections)

@@ -31,6 +31,7 @@ ELEMENT = Element(
     ],
     also_known_as=("tapered dashpot", "position-sensitive damping"),
     family="damping",
+    placed=True,
     confusable={
         "viscous_damper": "the same while the machine stays at one position: move it with a bias force",
         "quadratic_stiffness": "in phase with position, not with speed",
