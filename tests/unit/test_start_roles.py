@@ -6,6 +6,7 @@ import pytest
 from foreign import joint_state, message, moved, roles_of, servo, tones
 
 from rhythmid.errors import InputError
+from rhythmid.model import Model
 from rhythmid.record.read import read_record
 from rhythmid.record.signals import Signals
 from rhythmid.start.start import guess, start
@@ -133,6 +134,10 @@ def test_reference_and_effort_give_the_controllers_gains(tmp_path):
     assert model.value("position_control.proportional") == pytest.approx(400.0, rel=0.1)
     assert model.value("position_control.derivative") == pytest.approx(28.0, rel=0.2)
     assert model.value("inertia.mass") == pytest.approx(1.0, rel=0.1)
+    # in closed loop the motion alone does not tell their scale: it stays that of the effort
+    for name, true in (("proportional", 400.0), ("derivative", 28.0)):
+        prior = Model.from_text(begun.model).parameters[f"position_control.{name}"].prior
+        assert prior is not None and abs(prior.mean - true) < 3.0 * prior.std < 0.5 * true
 
 
 def test_an_accelerometer_and_a_thrust_of_which_only_the_topic_tells(tmp_path):

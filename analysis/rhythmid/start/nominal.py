@@ -19,12 +19,15 @@ from rhythmid.start.correction import Correction, offset_of
 from rhythmid.start.meaning import is_measured_effort, tells_unit
 from rhythmid.start.roles import Roles
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
-from rhythmid.value import Value
+from rhythmid.value import Prior, Value
 
 LAW_KEPT = 0.5  # largest unexplained share of an effort for which a controller is taken as its cause
 CHANNELS_APART = 3.0  # samples by which channels of one recording may be apart because of filters and buses; see `direction`
 # ratio to inertia times the motion's angular frequency, used where the balance shows no damping
 LEAST_DAMPING = 0.01
+# least relative standard deviation of gains by least squares: a controller's filters, and the sample by which its effort lags, shift them
+# by a few per cent
+LEAST_SPREAD = 0.05
 
 
 @dataclass(frozen=True)
@@ -220,7 +223,17 @@ def _controller(
         "derivative": _short(law.coefficients["velocity"]),
     }
     made = model.with_element(catalogue["position_control"], gains)
-    reason = f"reference and effort were recorded, and these gains explain {1.0 - law.left:.0%} of the effort"
+    # without a prior, gains, mass and forces would have no common scale in closed loop
+    spread = max(math.sqrt(law.left), LEAST_SPREAD)
+    known = {name: made.parameters[f"position_control.{name}"] for name in gains}
+    made = made.with_parameters({
+        f"position_control.{name}": replace(one, prior=Prior(one.value, _short(spread * one.value)))
+        for name, one in known.items() if one.value > 0.0
+    })  # fmt: skip
+    reason = (
+        f"reference and effort were recorded, and these gains explain {1.0 - law.left:.0%} of the effort; their priors keep the scale of all "
+        "forces"
+    )
     return made, reasons | {"position_control": reason}, ""
 
 

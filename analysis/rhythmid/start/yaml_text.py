@@ -174,9 +174,12 @@ def _term(term: Term) -> str:
 
 
 def _value(value: Value) -> str:
-    return (
-        f"{{value: {value.value:g}, unit: {json.dumps(value.unit)}{', fixed: true' if value.fixed else ''}}}"
-    )
+    parts = [f"value: {value.value:g}", f"unit: {json.dumps(value.unit)}"]
+    if value.fixed:
+        parts.append("fixed: true")
+    if value.prior is not None:
+        parts.append(f"prior: {{mean: {value.prior.mean:g}, std: {value.prior.std:g}}}")
+    return f"{{{', '.join(parts)}}}"
 
 
 def time_of(clock: Clock) -> str:
