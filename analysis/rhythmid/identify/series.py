@@ -27,6 +27,8 @@ from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, is_hel
 
 # share of blocks with a gap above which timestamps are too uneven for averaging; rare gaps cost fewer
 TORN = 0.1
+# share of a period by which more than half of the steps between samples differ from it, where samples come in bursts: most of them together
+BURST = 0.5
 OFTEN = 0.5  # in blocks: interval of a held command below which the machine averages its steps
 HELD_OUT = 0.2  # last part of each series, as a share, that is held out where no separate records are given
 REACH = 2  # blocks on either side used in the differences of `of_block`
@@ -253,7 +255,7 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
     if block is None:
         block = min(block_length(s.value, s.period) for s in longest_of_each(made))
     whole = [_whole_blocks(s, block) for s in made]
-    if np.concatenate(whole).mean() < 1.0 - TORN:
+    if np.concatenate(whole).mean() < 1.0 - TORN or any(map(_in_bursts, made)):
         block, whole = 1, [np.ones(len(s.time), bool) for s in made]
     made = [replace(s, block=block, used=used) for s, used in zip(made, whole)]
     stamped = [s for s, record in zip(made, records, strict=True) if record.stamped]
@@ -326,6 +328,11 @@ def _check(record: Record) -> None:
             f"{record.name}: {len(bad)} values of the {what} are not finite, the first of them at "
             f"t = {channel.time[bad[0]]:g} s; take these samples out"
         )
+
+
+def _in_bursts(series: Series) -> bool:
+    """Whether most samples came together with others, as from a log that releases them late."""
+    return float(np.median(np.abs(np.diff(series.time) / series.period - 1.0))) > BURST
 
 
 def _whole_blocks(series: Series, block: int) -> Mask:
