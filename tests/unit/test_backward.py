@@ -10,7 +10,7 @@ from machines import CATALOGUE, hopper
 from rhythmid.diagnose.search import backward as module
 from rhythmid.diagnose.search.round import Round
 from rhythmid.diagnose.search.score_tests import Score
-from rhythmid.diagnose.search.trial import Trial
+from rhythmid.diagnose.search.trial import Proposal, Trial
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series
 
@@ -27,8 +27,9 @@ def trial(chi2: float, spring: float, **added: dict[str, float]) -> Trial:
     return Trial(tuple(added), model, (), chi2, 2000, len(model.free), True, QUIET)
 
 
-def test_effects_are_exchanged_for_those_that_scored_well_or_fit_well_alone(monkeypatch: pytest.MonkeyPatch):
-    tried = []
+def proposed(monkeypatch: pytest.MonkeyPatch) -> list[Proposal]:
+    """The models that the elimination tries, none of which is fitted."""
+    tried: list[Proposal] = []
 
     def run_trials(proposals, *_, **__):
         tried.extend(proposals)
@@ -36,6 +37,11 @@ def test_effects_are_exchanged_for_those_that_scored_well_or_fit_well_alone(monk
 
     monkeypatch.setattr(module, "run_trials", run_trials)
     monkeypatch.setattr(module, "under_noise", lambda trials, *_: list(trials))
+    return tried
+
+
+def test_effects_are_exchanged_for_those_that_scored_well_or_fit_well_alone(monkeypatch: pytest.MonkeyPatch):
+    tried = proposed(monkeypatch)
     best = trial(100.0, 200.0, coulomb_friction={"force": 1.0}, cubic_stiffness={"coefficient": 10.0})
     alone = [
         trial(300.0, 150.0, quadratic_stiffness={"coefficient": 3.0}),
@@ -64,14 +70,7 @@ def test_what_scored_well_begins_where_it_ended_alone_though_others_fit_better(
     monkeypatch: pytest.MonkeyPatch,
 ):
     """A pendulum's gravity added to a spring that contains it already ends in another minimum."""
-    tried = []
-
-    def run_trials(proposals, *_, **__):
-        tried.extend(proposals)
-        return [], []
-
-    monkeypatch.setattr(module, "run_trials", run_trials)
-    monkeypatch.setattr(module, "under_noise", lambda trials, *_: list(trials))
+    tried = proposed(monkeypatch)
     best = trial(100.0, 200.0, coulomb_friction={"force": 1.0}, cubic_stiffness={"coefficient": 10.0})
     alone = [
         trial(300.0, 150.0, quintic_stiffness={"coefficient": 3.0}),

@@ -27,7 +27,8 @@ from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, is_hel
 
 # share of blocks with a gap above which timestamps are too uneven for averaging; rare gaps cost fewer
 TORN = 0.1
-# share of a period by which more than half of the steps between samples differ from it, where samples come in bursts: most of them together
+# median difference between the steps of the samples and their period, as a share of it, above which samples come in bursts: then most
+# steps are almost zero
 BURST = 0.5
 OFTEN = 0.5  # in blocks: interval of a held command below which the machine averages its steps
 HELD_OUT = 0.2  # last part of each series, as a share, that is held out where no separate records are given

@@ -47,9 +47,8 @@ CARRIED_ON = 0.3  # share of the spread of chi2 up to which a model is fitted to
 LITTLE = 0.5
 HOPS = 12  # largest number of hops from one minimum to the next
 HOP_DISTANCES = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # lengths of a hop, times the distance between minima
-CONCLUSIVE = (
-    5.0  # standard errors behind the best model from which another cannot compete on unseen data either
-)
+# standard errors behind the best model from which another cannot compete on unseen data either
+CONCLUSIVE = 5.0
 # largest number of halvings of the longest step, over all checks of a run: from samples 20 ms apart to 0.3 ms. An error that remains
 # is not due to integration but to jumps, such as a dead band's, whose instants change with every step
 MOST_HALVINGS = 6

@@ -17,17 +17,15 @@ from rhythmid.identify.inverse_dynamics.motion import effort_channel
 from rhythmid.identify.inverse_dynamics.motion_noise import noise_power
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
-
-# share of the effort's variation up to which its noise is of no practical importance. Filters, the hold of a command and the
-# smoothness of a free map leave as much of an effort without any noise (measured: 0.25 %)
-FAINT = 0.005
+from rhythmid.record.timing import nominal_period
 
 
 def effort_is_noisier(balance: Balance, records: Sequence[Record], model: Model) -> bool:
     """Whether the noise of the recorded effort is clearly above that of the measured motion, both in the effort's unit and band.
 
     The noise of the effort is its white floor, but no more than what the motion leaves unexplained: an excitation that is itself
-    white is no noise, because it moves the machine. Where much more than the floor is unexplained, noise is not what it is, and the answer is False.
+    white is no noise, because it moves the machine. Where much more than the floor is unexplained, noise is not the cause, and the
+    answer is False.
 
     Parameters
     ----------
@@ -37,15 +35,14 @@ def effort_is_noisier(balance: Balance, records: Sequence[Record], model: Model)
     unexplained = balance.bandwidth.unexplained
     recorded = [channel for one in records if (channel := effort_channel(one, model)) is not None]
     floor = balance.bandwidth.effort * float(np.mean([_floor(channel) for channel in recorded]))
-    noise = min(floor, unexplained)
-    if unexplained > ABOVE * floor or noise <= (FAINT * float(np.std(balance.measured))) ** 2:
+    if unexplained > ABOVE * floor:
         return False
-    return noise > ABOVE * noise_power(balance, records, model)
+    return min(floor, unexplained) > ABOVE * noise_power(balance, records, model)
 
 
 def _floor(channel: Channel) -> float:
     """Floor of the channel's power spectral density [unit^2/Hz]."""
-    rate = 1.0 / float(np.median(np.diff(channel.time)))
+    rate = 1.0 / nominal_period(np.diff(channel.time))
     _, power = welch(
         channel.value, rate, nperseg=max(min(len(channel.value), 64), len(channel.value) // SEGMENTS)
     )
