@@ -237,14 +237,19 @@ def load_units() -> None:
             Units().check(unit, "m", "warm-up")
 
 
-def campaign(target: Target, seed: int, first: int, count: int, until: float, scratch: Path) -> Tally:
-    """At most `count` inputs from number `first` on, until the clock reads `until`."""
+def warm_up(target: Target, scratch: Path) -> None:
+    """Read valid inputs: what a reader loads and compiles once is neither an input's time or memory nor a file that it writes."""
     load_units()
-    for spare in range(WARM_UP):  # loading and compiling once does not count as an input's time or memory
+    for spare in range(WARM_UP):
         (folder := scratch / f"warm{spare}").mkdir(exist_ok=True)
         with suppress(Exception):
             target.use(random.Random(spare).choice(target.valid()), folder, spare)
         shutil.rmtree(folder)
+
+
+def campaign(target: Target, seed: int, first: int, count: int, until: float, scratch: Path) -> Tally:
+    """At most `count` inputs from number `first` on, until the clock reads `until`."""
+    warm_up(target, scratch)
     total, number = Tally(), first
     while number < first + count and time.monotonic() < until:
         tally, number = watched(target, seed, number, min(number + BATCH, first + count), until, scratch)

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fuzz import Watch, attempt, load_units
+from fuzz import Watch, attempt, warm_up
 from fuzz_bags import OWN
-from fuzz_targets import EXPERIMENT, TARGETS
+from fuzz_targets import EXPERIMENT, TARGETS, Target
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refusal
@@ -40,8 +40,15 @@ ZEROS = b"\0" * (1 << 20)
 
 @pytest.fixture(scope="module")
 def watch() -> Watch:
-    load_units()
     return Watch()
+
+
+@pytest.fixture(scope="module", params=TARGETS)
+def target(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Target:
+    """A reader that has loaded what it needs."""
+    found = TARGETS[request.param]
+    warm_up(found, tmp_path_factory.mktemp("warm"))
+    return found
 
 
 IN_GRAMS = """
@@ -49,7 +56,7 @@ import math, sys
 from dataclasses import replace
 from pathlib import Path
 from fuzz import campaign
-from fuzz_targets import EXPERIMENT, TARGETS
+from fuzz_targets import EXPERIMENT, TARGETS, Target
 target = replace(TARGETS["model"], spoil=lambda rng, data: data.replace(b"unit: kg", b"unit: g"))
 tally = campaign(target, 0, 0, 1, math.inf, Path(sys.argv[1]))
 print(tally.refused, tally.failures)
@@ -65,11 +72,9 @@ def test_what_the_first_foreign_unit_loads_is_not_taken_for_a_pickle_in_the_file
     assert done.stdout == "1 {}\n", done.stderr
 
 
-@pytest.mark.parametrize("name", TARGETS)
 @settings(max_examples=15)
 @given(number=st.integers(0, 2**32))
-def test_a_spoilt_file_is_read_or_refused_in_one_line(name, number, tmp_path_factory, watch):
-    target = TARGETS[name]
+def test_a_spoilt_file_is_read_or_refused_in_one_line(target, number, tmp_path_factory, watch):
     folder = tmp_path_factory.mktemp("hostile")
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(tempfile, "tempdir", str(folder))
