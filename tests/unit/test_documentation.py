@@ -74,6 +74,7 @@ def test_the_files_of_other_machines_are_read_and_fit_together(machine, tmp_path
         "docs/files.md",
         "docs/machines.md",
         "docs/real.md",
+        "docs/recordings.md",
         "docs/diagnose.md",
         "docs/python.md",
         "docs/export.md",

@@ -183,3 +183,19 @@ def test_the_real_recordings_on_the_first_page_are_those_of_the_summary():
     )
     right, cases = (sum(map(int, column)) for column in zip(*pairs))
     assert f"right in {right} of {cases}" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_table_of_kinds_of_machines_counts_the_recordings_that_are_listed():
+    listed = (DOCS / "recordings.md").read_text(encoding="utf-8")
+    real = (DOCS / "real.md").read_text(encoding="utf-8")
+    for section in re.split(r"^## ", listed, flags=re.MULTILINE)[1:]:
+        kind = section.partition("\n")[0]
+        results = re.findall(r"^\| .* \| ([^|]+) \|$", section, re.MULTILINE)
+        stated = [
+            word.strip("* ") for one in results for word in one.partition(";")[0].split(", ")
+        ]  # a row of several machines has a result for each
+        right, known = stated.count("right"), stated.count("listed")
+        wrong = stated.count("missed") + stated.count("wrong")
+        if kind != "Robots with several joints":
+            row = f"| {right + known + wrong} | {right} | {known} | {wrong} |"
+            assert re.search(rf"^\| \[{re.escape(kind)}\].*{re.escape(row)}$", real, re.MULTILINE), kind
