@@ -241,3 +241,17 @@ def test_one_free_law_stands_for_three_effects_of_the_same_quantity_only(monkeyp
     left = ("cubic_stiffness", "quadratic_stiffness", "coulomb_friction")
     kept = proposed(monkeypatch, plain, two, CATALOGUE, *left)
     assert not any(label.startswith("free_") for one in kept for label in one.added)
+
+
+def test_a_law_of_another_family_that_is_declared_confusable_is_fitted_in_the_place_of_the_chosen_one(
+    monkeypatch, plain
+):
+    contact, spring = CATALOGUE["ground_contact_loss"], CATALOGUE["bilinear_stiffness"]
+    assert contact.family != spring.family
+    assert spring.name in contact.confusable or contact.name in spring.confusable
+    model = plain.model.with_element(spring, {"change": -10.0, "kink": 0.2})
+    round_of_both = (Round((Score(contact, {"loss": 0.5}, 50.0, 1.0),), 0.0),)
+    kept = proposed(
+        monkeypatch, plain, replace(plain, model=model), CATALOGUE, spring.name, rounds=round_of_both
+    )
+    assert (contact.name,) in [one.added for one in kept]

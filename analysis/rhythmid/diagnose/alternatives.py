@@ -106,16 +106,15 @@ def _reduced(chosen: Trial, weighed: Sequence[Trial]) -> Iterator[Proposal]:
 
 
 def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Trial]) -> Iterator[Proposal]:
-    """The base model with other elements of the family of `term`.
+    """The base model with elements related to that of `term` in its place: of its family, or declared to be confusable with it.
 
     Only elements that scored in some round, that are no hypothesis yet and that need nothing that the base model lacks are
     proposed. The first guesses include the fitted values of the other members of the family, and those of the element alone:
     it may need other values of the model's own parameters. A spring, for example, contains a pendulum's gravity.
     """
-    family = term.element.family
     scored: dict[str, list[Score]] = {}
     for one in sorted((s for r in rounds for s in (*r.scores, *r.local)), key=lambda s: -s.statistic):
-        if one.statistic > 0.0 and one.element.family == family != "":
+        if one.statistic > 0.0 and _related(one.element, term.element):
             scored.setdefault(one.element.name, []).append(one)
     places = {
         label: trial
@@ -131,7 +130,7 @@ def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Tri
         made = propose(base.model, element, [one.start for one in scores[:2]], base.added)
         own = made.added[-1]
         known_ends = [
-            (label, trial) for label, trial in places.items() if trial.element(label).family == family
+            (label, trial) for label, trial in places.items() if _related(trial.element(label), element)
         ]
         known_ends += [(trial.added[0], trial) for trial in weighed if trial.names == (name,)]
         ends = [
@@ -141,6 +140,12 @@ def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Tri
         known = set(made.model.parameters)
         nearer = tuple({key: value for key, value in end.items() if key in known} for end in ends)
         yield replace(made, guesses=(*made.guesses, *nearer))
+
+
+def _related(one: Element, other: Element) -> bool:
+    """Whether two elements are of one family, or one is declared to be confusable with the other."""
+    same = one.family == other.family != ""
+    return same or one.name in other.confusable or other.name in one.confusable
 
 
 def _renamed(parameter: str, label: str, own: str) -> str:
