@@ -169,9 +169,14 @@ class Model:
             self.value(name)
         return self.with_parameters({n: replace(current[n], value=float(v)) for n, v in values.items()})
 
+    @property
+    def turns(self) -> dict[str, float]:
+        """Period of the effect of each element's parameter, by name; infinite where it is not periodic."""
+        return {f"{t.label}.{p.name}": p.turn for t in self.terms for p in t.element.parameters}
+
     def unwound(self) -> "Model":
         """An equivalent copy whose free phases lie within half a turn of zero."""
-        turns = {f"{t.label}.{p.name}": p.turn for t in self.terms for p in t.element.parameters}
+        turns = self.turns
         return self.with_values(
             {name: math.remainder(self.value(name), turns[name]) for name in self.free if name in turns}
         )

@@ -42,6 +42,18 @@ def test_a_play_whose_far_edge_is_never_reached_has_an_open_interval():
     assert 0.0 < found.fit.std["switched_damper.stance"] < 0.1
 
 
+def test_a_phase_is_not_followed_round_to_the_same_model():
+    ripple = {"amplitude": 0.05, "wavelength": 5e-3, "phase": 0.5}
+    machine = hopper().with_element(CATALOGUE["position_ripple"], ripple)
+    fit = fitted(machine, machine)
+    covariance = np.diag(np.diag(fit.covariance))
+    place = fit.names.index("position_ripple.phase")
+    covariance[place, place] = (math.pi / 4.0) ** 2  # eight standard deviations are a turn
+    wide = replace(fit, covariance=covariance)
+    found = profiled(search_of(wide, "position_ripple"))
+    assert found.fit.std["position_ripple.phase"] == pytest.approx(math.pi / 4.0)
+
+
 def test_where_chi2_falls_at_an_intervals_end_the_descent_goes_on():
     machine = hopper().with_element(CATALOGUE["quadratic_drag"], {"coefficient": 0.5})
     fit = fitted(machine, machine)

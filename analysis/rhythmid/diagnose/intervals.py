@@ -57,7 +57,8 @@ def profiled(found: Search, pool: ThreadPoolExecutor | None = None) -> Search:
     """The search with its fit at the lowest minimum found, and effect intervals that the likelihood confirms.
 
     A parameter is undetermined, with infinite variance, if the likelihood rises neither before its bound nor within a
-    meaningful multiple of its value. If a deadline passes, the intervals are confirmed only as far as they were followed.
+    meaningful multiple of its value (of a phase: half a turn). If a deadline passes, the intervals are confirmed only as
+    far as they were followed.
     """
     reach = np.zeros(len(found.fit.names))
     for _ in range(DESCENTS):
@@ -148,12 +149,23 @@ def _followed(fit: Fit, way: _Way, pool: ThreadPoolExecutor | None) -> tuple[Arr
 
 
 def _distance(fit: Fit, model: Model) -> Array:
-    return np.abs([model.value(name) - value for name, value in zip(fit.names, fit.values)])
+    """Distance (p,) of a model's parameters from those of the fit, of a phase the nearest way round."""
+    turns = fit.model.turns
+    away = [
+        math.remainder(model.value(name) - value, turns.get(name, math.inf))
+        for name, value in zip(fit.names, fit.values)
+    ]
+    return np.abs(away)
 
 
 def _moved(fit: Fit, way: _Way) -> Model | None:
-    """The model with one parameter moved and the others following the covariance; None where a bound is in the way."""
+    """The model with one parameter moved and the others following the covariance.
+
+    None where a bound is in the way, and for a phase beyond half a turn, from where it comes back to the same model.
+    """
     column = fit.covariance[:, way.place]
+    if abs(way.deviations) * math.sqrt(column[way.place]) > _half_turn(fit, way.place):
+        return None
     values = fit.values + way.deviations * column / math.sqrt(column[way.place])
     bounds = [fit.model.parameters[name].bounds for name in fit.names]
     if not bounds[way.place][0] < values[way.place] < bounds[way.place][1]:
@@ -193,10 +205,19 @@ def _rise(problem: Problem, fit: Fit, place: int, residuals: Sequence[Array]) ->
 
 
 def _within(fit: Fit, way: _Way) -> bool:
-    """Whether a step ends before its parameter's bound and within a meaningful multiple of the parameter's value."""
+    """Whether a step ends before its parameter's bound and within a meaningful multiple of the parameter's value.
+
+    The value of a phase is no scale.
+    """
     far = abs(way.deviations) * math.sqrt(fit.covariance[way.place, way.place])
-    near = far < BEYOND * abs(fit.values[way.place]) and abs(way.deviations) <= WIDEST
+    phase = math.isfinite(_half_turn(fit, way.place))
+    near = (phase or far < BEYOND * abs(fit.values[way.place])) and abs(way.deviations) <= WIDEST
     return near and _moved(fit, way) is not None
+
+
+def _half_turn(fit: Fit, place: int) -> float:
+    """Half the period of a phase; infinite for other parameters."""
+    return 0.5 * fit.model.turns.get(fit.names[place], math.inf)
 
 
 def _again(fit: Fit, way: _Way, pool: ThreadPoolExecutor | None) -> tuple[float, Model]:
