@@ -38,7 +38,7 @@ from rhythmid.diagnose.search.score_tests import (
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.shape import shape_of
-from rhythmid.diagnose.size_error import size_errors
+from rhythmid.diagnose.size_error import size_errors, std_beside_others
 from rhythmid.diagnose.small_effects import small_effects
 from rhythmid.diagnose.tick_interval import ticks_followed
 from rhythmid.diagnose.verdict import Decision, decide
@@ -308,7 +308,9 @@ class _Weighing:
             case.tell("adding to the standard deviations what small effects may change")
             unnamed = small_effects(found, self.catalogue, case)
         fit = with_robust_covariance(found.fit)
-        errors = size_errors(fit.model, chosen.elements, fit.std)
+        priors = [fit.model.parameters[name].prior for name in fit.names]
+        std = std_beside_others(chosen.elements, fit.std, fit.linearisation.jacobian, priors)
+        errors = size_errors(fit.model, chosen.elements, std)
         return replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed)), errors
 
     def over(self, unseen: Sequence[Series], found: Search) -> tuple[Fit | None, Fit | None]:

@@ -1,5 +1,6 @@
 """A fitted hypothesis about an effort, in the form that the evidence needs."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -10,9 +11,11 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.constants import UNNAMED_EFFORT
 from rhythmid.diagnose.evidence import Linearised, odds_of_rests
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
+from rhythmid.diagnose.size_error import std_beside_others
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, size_of
+from rhythmid.identify.robust_covariance import weighted
 from rhythmid.model import Model
 from rhythmid.simulation.transport import INPUT_DELAY
 from rhythmid.value import Prior
@@ -82,6 +85,17 @@ class Fitted:
     def std(self) -> dict[str, float]:
         """Standard deviations of the estimated parameters, inflated by the residual's autocorrelation."""
         return dict(zip(self.fit.names, np.asarray(self.fit.std[1:]).tolist(), strict=True))
+
+    def std_beside_others(self) -> dict[str, float]:
+        """The same, of each effect's parameters where those of the other effects are known."""
+        rows = weighted(self.fit)
+        std = {"alignment": float(self.fit.std[0])} | self.std()
+        inside = dict(zip(std, rows.inside, strict=True))
+        estimated = {name: std[name] for name in std if inside[name]}
+        priors = [
+            Prior(0.0, 1.0 / math.sqrt(one)) if one > 0.0 else None for one in self.fit.precision[rows.inside]
+        ]
+        return self.std() | std_beside_others(self.elements, estimated, rows.columns, priors)
 
 
 def kind_of(elements: Sequence[str], model: Model) -> Kind:

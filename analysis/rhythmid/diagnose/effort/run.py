@@ -179,7 +179,7 @@ def effort_run(
         contest = replace(contest, structured_after=lasting)
     least = detectable(predicted[chosen.elements].error, time) / size
     robust = replace(chosen, fit=with_robust_std(chosen.fit, found.balance.record))
-    errors_of_sizes = size_errors(chosen.fit.model, chosen.elements, robust.std())
+    errors_of_sizes = size_errors(chosen.fit.model, chosen.elements, robust.std_beside_others())
     return EffortResult(
         applicability,
         found,
