@@ -115,9 +115,7 @@ def select(contest: Contest) -> Selection:
                 sound.append(one)
         if not sound:
             continue
-        close = [one for one in sound if one is sound[0] or equivalent(one, sound[0], contest)]
-        refused = {row.hypothesis for row in told}
-        granted = [one for one in close if one.elements not in refused]
+        granted = _granted(sound, {row.hypothesis for row in told}, contest)
         if granted:
             chosen = smaller = _simplest(granted)
             told += _beaten(smaller, granted, contest)
@@ -126,6 +124,29 @@ def select(contest: Contest) -> Selection:
             smaller = max(smaller, sound[0], key=lambda one: round(one.prediction.score, 6))
     chosen = _beside_others(chosen, contest, {row.hypothesis for row in told})
     return Selection(_in_parts(chosen, contest, told), tuple(told))
+
+
+def _granted(
+    sound: Sequence[Hypothesis], refused: Collection[tuple[str, ...]], contest: Contest
+) -> list[Hypothesis]:
+    """Hypotheses that are not refused and predict as well as the best of `sound`, which are sorted by prediction.
+
+    The best itself may be refused in favour of a simpler law. If another hypothesis predicts better than the simplest of those found, it is
+    not one of them, and they give way to it.
+    """
+    close = [one for one in sound if one is sound[0] or equivalent(one, sound[0], contest)]
+    granted = [one for one in close if one.elements not in refused]
+    if not granted:
+        return []
+    simplest = _simplest(granted)
+    ahead = [
+        one
+        for one in sound
+        if one.elements not in refused
+        and one.prediction.score > simplest.prediction.score
+        and not equivalent(simplest, one, contest)
+    ]
+    return _granted(ahead, refused, contest) if ahead else granted
 
 
 def _in_parts(chosen: Hypothesis, contest: Contest, told: Sequence[Rejection]) -> Hypothesis:

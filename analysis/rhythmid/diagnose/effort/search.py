@@ -205,11 +205,14 @@ class _Search:
                 PRACTICAL_EFFORT, simpler,
             )  # fmt: skip
 
-        # among related laws the simplest one that no richer law replaces represents them all
+        # among related laws the simplest one that no richer law replaces represents them all: not only not that which predicts best
         for index in order[1:]:
             plain = claimed[index]
             if special_case(plain, claimed[best]) and not replaces(claim(best, plain, plain)):
                 best = index
+        plain = claimed[best]
+        richer = [index for index in order if special_case(plain, claimed[index])]
+        best = next((index for index in richer if replaces(claim(index, plain, plain))), best)
         return None if rejections_of(claim(best, parent.claimed(before))) else new[best]
 
     def _nearer(self, new: Sequence[Fitted]) -> list[Fitted]:
