@@ -13,7 +13,17 @@ from functools import partial
 
 import numpy as np
 
-from rhythmid.diagnose.constants import ADEQUATE, HOLDS, OPEN, PRIOR_ODDS, STATED, STEEPNESS, VAGUE, VAGUENESS
+from rhythmid.diagnose.constants import (
+    ADEQUATE,
+    HOLDS,
+    OPEN,
+    PRIOR_ODDS,
+    SMALL,
+    STATED,
+    STEEPNESS,
+    VAGUE,
+    VAGUENESS,
+)
 from rhythmid.diagnose.evidence import probabilities
 from rhythmid.diagnose.hypothesis import Hypothesis
 from rhythmid.diagnose.rejections import keeps_shape
@@ -155,15 +165,24 @@ def chance_of_law(share: float, left: float, size_error: float = 0.0, family: st
 
     Parameters
     ----------
-    share, left : shares of the mismatch that the effect explains and that is left. The remainder may belong to the part of the
-        mismatch that the effect should explain.
+    share, left : shares of the mismatch that the effect explains and that is left; see `of_own`.
     size_error : relative standard deviation of the effect's size.
     family : its family, whose prior odds multiply the odds found in the proof.
     """
+    left = of_own(share, left)
     own = share / (share + left) if share + left > 0.0 else 0.0
     chance = adequacy(own) * resolved(size_error)
     odds = prior_odds(family)
     return odds * chance / (1.0 - chance + odds * chance)
+
+
+def of_own(share: float, left: float) -> float:
+    """The part of what is left that may belong to what an effect should explain, as a share of the mismatch.
+
+    Small effects that the model lacks may leave up to `SMALL` of the mismatch, whichever effect is the true law: of this the effect answers
+    for its share. All that is left beyond may be its own.
+    """
+    return share * min(left, SMALL) + max(left - SMALL, 0.0)
 
 
 def doubt(chance: float, family: str) -> float:
@@ -194,10 +213,13 @@ def chance_beside(
 
 
 def removed_by(label: str, chosen: Hypothesis, contest: Contest) -> float:
-    """Share of the mismatch that an effect of a hypothesis removes beside its others; 0 where the model without it was not fitted."""
+    """Share of the mismatch that an effect of a hypothesis removes beside its others.
+
+    Where the model without it was not fitted, the best one with some of the others takes its place.
+    """
     whole = contest.mismatch
     others = set(chosen.elements) - {label}
-    without = [one.prediction.mean_square for one in contest.hypotheses if set(one.elements) == others]
-    if whole <= 0.0 or not without:
+    without = [one.prediction.mean_square for one in contest.hypotheses if set(one.elements) <= others]
+    if whole <= 0.0:
         return 0.0
     return float(np.clip((min(without) - chosen.prediction.mean_square) / whole, 0.0, 1.0))
