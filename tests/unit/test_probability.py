@@ -135,3 +135,32 @@ def test_an_effect_is_as_doubtful_as_what_stands_beside_it_without_a_threshold()
     cubic = [beside_a_ripple(floor).probability["cubic"] for floor in np.linspace(0.001, 0.03, 30)]
     assert np.all(np.diff(cubic) > 0.0)
     assert np.max(np.diff(cubic)) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("first", "both", "floor", "named"), [(0.011, 0.003, 1e-3, "a b"), (0.06, 0.03, 1e-3, "a")]
+)
+def test_a_second_effect_answers_for_its_share_of_what_small_effects_may_leave_and_for_all_beyond(
+    first, both, floor, named
+):
+    # in both cases a free map removes a third or more of what the second effect removes
+    made = contest(
+        NOMINAL,
+        supposed("a", predicted(first, 1000.0)),
+        supposed("a b", predicted(both, 1500.0)),
+        maps={"time": predicted(floor, 1600.0)},
+    )
+    decision = decided(made)[1]
+    assert (decision.verdict, decision.named) == ("missing_physics", tuple(named.split()))
+
+
+def test_an_effect_whose_company_is_in_doubt_is_doubted_where_not_all_companies_were_fitted():
+    made = contest(
+        NOMINAL,
+        supposed("a", predicted(0.3)),
+        supposed("b", predicted(0.9)),
+        supposed("a b c", predicted(0.01)),
+    )
+    sure, doubted = (decided(made, errors={"b": error, "c": error})[1] for error in (0.01, 1.0))
+    assert sure.named == ("a", "b", "c")
+    assert doubted.probability["a"] < 0.7 * sure.probability["a"]

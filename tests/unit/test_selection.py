@@ -113,6 +113,17 @@ def test_a_richer_law_replaces_one_that_it_contains_by_its_share_of_the_mismatch
         assert equivalent(plain, richer, contest(NOMINAL, plain, richer)) == same
 
 
+def test_a_law_that_replaces_a_simpler_one_is_not_passed_over_because_another_predicts_more_blocks_better():
+    richer = {"coulomb": ("asymmetric", "stribeck")}
+    plain = supposed("coulomb", predicted(0.06, 500.0), richer=richer)
+    asymmetric = supposed(
+        "asymmetric", predicted(0.055, 750.0), free=9
+    )  # removes too little of what the plain one leaves
+    stribeck = supposed("stribeck", predicted(0.01, 720.0), free=9)
+    assert select(contest(NOMINAL, plain, asymmetric)).chosen is plain
+    assert select(contest(NOMINAL, plain, asymmetric, stribeck)).chosen is stribeck
+
+
 def test_where_the_simplest_of_several_that_predict_alike_is_refused_another_is_granted():
     best = supposed("a", predicted(0.1, 80.0, seed=1), free=9)
     plain = supposed("b", predicted(0.1, 79.0, seed=1), shape={"within_bounds": math.inf})
