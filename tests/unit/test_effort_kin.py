@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import pytest
 from axes import CATALOGUE, axis, axis_model
+from contests import contest, predicted, supposed
 
 from rhythmid.diagnose.effort.fitted import Fitted
-from rhythmid.diagnose.effort.kin import at_values_of
+from rhythmid.diagnose.effort.kin import at_values_of, represented
 from rhythmid.diagnose.effort.search import EffortSearch, search_effort
 
 KEPT = ("coulomb_friction", "asymmetric_coulomb_friction", "quadratic_drag", "viscous_damper")
@@ -46,3 +47,22 @@ def test_a_special_case_fits_about_as_well_as_the_law_that_contains_it_where_bot
         "asymmetric_coulomb_friction.transition"
     )
     assert 0.5 < ratio < 2.0
+
+
+def test_related_laws_are_represented_by_one_that_replaces_the_simplest_though_another_predicts_more_blocks_better():
+    nominal, richer = supposed("", predicted(1.0)), {"coulomb": ("asymmetric", "stribeck")}
+    asymmetric = supposed(
+        "asymmetric", predicted(0.055, 750.0), free=9
+    )  # removes too little of what the plain one leaves
+    stribeck = supposed("stribeck", predicted(0.01, 720.0), free=9)
+    plain = supposed("coulomb", predicted(0.06, 500.0), richer=richer)
+    made = contest(nominal, asymmetric, stribeck, plain)
+    laws = [asymmetric, stribeck, plain]
+
+    def of(*order: int) -> str:
+        (name,) = laws[
+            represented(laws, order, lambda index, *others: made.claim(laws[index], *others))
+        ].names
+        return name
+
+    assert (of(0, 1, 2), of(0, 2), of(1, 2), of(2)) == ("stribeck", "coulomb", "stribeck", "coulomb")

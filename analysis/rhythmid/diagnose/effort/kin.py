@@ -1,9 +1,11 @@
 """Related laws: laws of one family, or of which one is a special case of the other."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from rhythmid.diagnose.effort.candidate import Screened
 from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.hypothesis import Hypothesis, special_case
+from rhythmid.diagnose.rejections import Claim, replaces
 from rhythmid.elements.element import Element
 from rhythmid.model import Model
 
@@ -51,3 +53,23 @@ def at_values_of(rich: Fitted, plain: Fitted) -> Model | None:
         for name in plain.fit.names
     }
     return plain.fit.model.with_values({name: known[end].value for name, end in ends.items() if end in known})
+
+
+def represented(
+    claimed: Sequence[Hypothesis],
+    order: Sequence[int],
+    claim: Callable[[int, Hypothesis, Hypothesis], Claim],
+) -> int:
+    """Index of the hypothesis that represents the best of `order`, sorted by prediction, and its related laws.
+
+    It is the simplest one that no richer law replaces: neither the best one nor another. `claim(index, without, simpler)` is a hypothesis
+    with those that it is compared with.
+    """
+    best = order[0]
+    for index in order[1:]:
+        plain = claimed[index]
+        if special_case(plain, claimed[best]) and not replaces(claim(best, plain, plain)):
+            best = index
+    plain = claimed[best]
+    richer = (index for index in order if special_case(plain, claimed[index]))
+    return next((index for index in richer if replaces(claim(index, plain, plain))), best)

@@ -28,12 +28,12 @@ from rhythmid.diagnose.effort.candidate import (
     widest,
 )
 from rhythmid.diagnose.effort.fitted import Fitted, kind_of, worst
-from rhythmid.diagnose.effort.kin import at_values_of, contained, kin, shortlist
+from rhythmid.diagnose.effort.kin import at_values_of, contained, kin, represented, shortlist
 from rhythmid.diagnose.effort.reference import Mapped, reference_of
 from rhythmid.diagnose.effort.scales import scales_at, scales_of
 from rhythmid.diagnose.evidence import Blocks, predict
-from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, special_case
-from rhythmid.diagnose.rejections import AT_END, SHAPES, Claim, keeps_shape, rejections_of, replaces
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
+from rhythmid.diagnose.rejections import AT_END, SHAPES, Claim, keeps_shape, rejections_of
 from rhythmid.diagnose.shape import within_bounds
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
@@ -196,7 +196,6 @@ class _Search:
         self.found.extend(new)
         *others, before, start, free = self.predicted([*new, parent, self.nominal, self.reference])
         order = sorted(range(len(new)), key=lambda index: -others[index].score)
-        best = order[0]
         claimed = [one.claimed(prediction) for one, prediction in zip(new, others)]
 
         def claim(index: int, without: Hypothesis, simpler: Hypothesis | None = None) -> Claim:
@@ -205,14 +204,7 @@ class _Search:
                 PRACTICAL_EFFORT, simpler,
             )  # fmt: skip
 
-        # among related laws the simplest one that no richer law replaces represents them all: not only not that which predicts best
-        for index in order[1:]:
-            plain = claimed[index]
-            if special_case(plain, claimed[best]) and not replaces(claim(best, plain, plain)):
-                best = index
-        plain = claimed[best]
-        richer = [index for index in order if special_case(plain, claimed[index])]
-        best = next((index for index in richer if replaces(claim(index, plain, plain))), best)
+        best = represented(claimed, order, claim)
         return None if rejections_of(claim(best, parent.claimed(before))) else new[best]
 
     def _nearer(self, new: Sequence[Fitted]) -> list[Fitted]:
