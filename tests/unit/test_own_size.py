@@ -27,4 +27,6 @@ def test_what_a_fit_alone_tells_of_a_size_is_told(verdict: str, own: float, std:
     fit: Any = SimpleNamespace(model=MODEL, std={"coulomb_friction.force": std})
     notes = own_sizes(cast(Decision, decision), cast(Fit, fit), {"coulomb_friction": own})
     assert len(notes) == told
-    assert all(one.startswith("coulomb_friction.force: 0.500 ± 0.02 N in its own fit") for one in notes)
+    assert all(
+        one.startswith("coulomb_friction.force: 0.500 ± 0.02 N beside the other effects") for one in notes
+    )
