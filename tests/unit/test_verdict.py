@@ -248,14 +248,19 @@ def test_the_simpler_of_two_laws_that_predict_alike_is_chosen():
     assert decided(contest(NOMINAL, clear, simple))[0].chosen is clear
 
 
-@pytest.mark.parametrize(("left", "expected"), [(1e-6, ("friction", "cubic")), (0.004, ("friction",))])
-def test_a_small_effect_beside_a_large_one_is_stated_where_nothing_of_its_size_is_left(left, expected):
-    both = supposed("friction cubic", predicted(0.005, 900.0))
+@pytest.mark.parametrize(
+    ("left", "expected"),
+    [(1e-6, ("friction", "cubic")), (0.004, ("friction", "cubic")), (0.014, ("friction",))],
+)
+def test_a_small_effect_beside_a_large_one_is_stated_where_no_more_of_its_size_is_left_than_small_effects_leave(
+    left, expected
+):
+    both = supposed("friction cubic", predicted(0.0145, 900.0))
     made = contest(
         NOMINAL,
-        friction(0.02, score=500.0),
+        friction(0.0295, score=500.0),
         both,
-        maps={"position": predicted(0.005 - left, 1100.0 if left > 1e-3 else 900.0)},
+        maps={"position": predicted(0.0145 - left, 1100.0 if left > 1e-3 else 900.0)},
     )
     _, decision = decided(made)
     assert (decision.verdict, decision.named) == ("missing_physics", expected)

@@ -74,9 +74,9 @@ MAINLY = 0.5
 # `ADEQUATE`, falling with the power `STEEPNESS` (fitted to sealed cases whose truth was in the catalogue or not: docs/proof.md)
 ADEQUATE = 0.18
 STEEPNESS = 1.5
-# share of the mismatch that a small effect may leave which the model lacks and no rule lets it name: a tenth of the motion that the main
-# effect changes (docs/proof.md, clutter: 0.5 to 10 %)
-SMALL = 0.01
+# share of the mismatch that small effects leave on average which the model lacks and no rule lets it name: the mean square of three that
+# are 0.5 to 10 % of the main one, log-uniform (docs/proof.md, clutter), relative to its own
+SMALL = 0.005
 # chance that the catalogue holds the truth where the names explain everything, their sizes are known and no other name predicts
 # as well (fitted to sealed cases, a quarter of whose laws the catalogue lacked: docs/proof.md)
 HOLDS = 0.95

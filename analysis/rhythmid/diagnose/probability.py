@@ -179,7 +179,7 @@ def chance_of_law(share: float, left: float, size_error: float = 0.0, family: st
 def of_own(share: float, left: float) -> float:
     """The part of what is left that may belong to what an effect should explain, as a share of the mismatch.
 
-    Small effects that the model lacks may leave up to `SMALL` of the mismatch, whichever effect is the true law: of this the effect answers
+    Small effects that the model lacks leave about `SMALL` of the mismatch, whichever effect is the true law: of this the effect answers
     for its share. All that is left beyond may be its own.
     """
     return share * min(left, SMALL) + max(left - SMALL, 0.0)
