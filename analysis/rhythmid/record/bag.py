@@ -10,6 +10,7 @@ from rhythmid import document
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted
 from rhythmid.record.compression import decompress_file
+from rhythmid.record.folder_of_tables import is_folder_of_tables
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.mcap_reader import McapReader
@@ -20,8 +21,8 @@ SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
 
 
 def is_bag(path: Path) -> bool:
-    """Whether the path looks like a bag: a directory, or a file with a storage file's suffix."""
-    return path.is_dir() or path.name.endswith(SUFFIXES)
+    """Whether the path looks like a bag: a directory that is no folder of tables, or a file with a storage file's suffix."""
+    return path.name.endswith(SUFFIXES) or (path.is_dir() and not is_folder_of_tables(path))
 
 
 class Bag:

@@ -28,8 +28,8 @@ from rhythmid.record.other_lengths import length_notes, unequal_arrays
 from rhythmid.record.placeholder import placeholder_of
 from rhythmid.record.sign_bit import sign_bit_of, signed
 from rhythmid.record.signals import Clock
-from rhythmid.record.stated_rate import stated_rate
-from rhythmid.record.table import SUFFIXES, WIDEST, Table, table_suffix
+from rhythmid.record.stated_rate import clock_of_counter, stated_rate
+from rhythmid.record.table import SUFFIXES, WIDEST, Table, is_table, table_suffix
 from rhythmid.record.table_clock import COUNTER, is_even, is_further_time, is_time, table_clock
 from rhythmid.record.two_clocks import clock_notes, trusted_clock
 
@@ -124,7 +124,7 @@ def inventory(source: str | Path, rate: float | None = None, vehicle: bool = Fal
     if not source.exists():
         raise InputError(f"{source}: no such file or directory")
     refuse_foreign(source)
-    if table_suffix(source) in SUFFIXES:
+    if is_table(source):
         table = Table.load(source)
         runs = grouped_runs(table)
         if runs is None:
@@ -158,7 +158,7 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
     elif rate is not None:
         clock, reason, every = Clock("rate", rate=rate), "as given with --rate", np.arange(count) / rate
     else:
-        clock, reason = table_clock(table.path, columns, unequal)
+        clock, reason = clock_of_counter(table, columns, *table_clock(table.path, columns, unequal))
         if is_time(str(clock.column), dict(columns)[str(clock.column)]):
             clock, reason = trusted_clock(columns, clock, reason)
         every = dict(columns)[str(clock.column)] * clock.scale

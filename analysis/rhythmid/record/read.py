@@ -28,7 +28,7 @@ from rhythmid.record.sign_bit import signed
 from rhythmid.record.signals import WHOLE, Signals, Sinusoid, Source
 from rhythmid.record.stale_rows import without_stale_rows
 from rhythmid.record.standstill import is_driven
-from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
+from rhythmid.record.table import Table, is_table, table_name
 from rhythmid.record.time_origin import CALENDAR, counted_from, origin_of
 from rhythmid.record.timing import put_in_order
 from rhythmid.record.unit_notes import unit_notes
@@ -97,7 +97,7 @@ def read_record(
     if not there:
         raise InputError(f"{source}: no such file or directory")
     refuse_foreign(source)
-    if signals is not None and table_suffix(source) in SUFFIXES:
+    if signals is not None and is_table(source):
         return read_tables(signals.of_table(source), opened)
     if not is_bag(source):
         raise InputError(
@@ -184,12 +184,13 @@ def read_tables(signals: Signals, opened: Opened | None = None) -> Record:
     first = min((float(samples.time.min()) for samples in made.values() if len(samples.time)), default=0.0)
     told = [note for table in tables.values() for note in table.notes]
     quality = Quality({}, notes=(*unit_notes(signals, first >= CALENDAR), *told, *stale))
-    if first >= CALENDAR:  # the used part starts with its first row
+    calendar = first >= CALENDAR
+    if calendar:  # the used part starts with its first row
         made = {role: replace(samples, time=samples.time - first) for role, samples in made.items()}
     record = _record(name, made, signals, SPLIT, quality)
     record = replace(record, hold=signals.hold) if signals.hold else with_hold(record)
-    record = _finish(replace(record, one_clock=len(clocks) == 1), signals)
-    return record if first >= CALENDAR else counted_from(record, origin_of(first))
+    record = _finish(replace(record, one_clock=len(clocks) == 1), signals, first if calendar else 0.0)
+    return record if calendar else counted_from(record, origin_of(first))
 
 
 def _is_merged(table: Table, signals: Signals) -> bool:
@@ -316,12 +317,12 @@ def _conflicts(samples: Samples, time: NDArray[np.float64], value: NDArray[np.fl
     return int(np.count_nonzero((samples.value != kept) & np.isfinite(samples.value)))
 
 
-def _finish(record: Record, signals: Signals) -> Record:
+def _finish(record: Record, signals: Signals, began: float = 0.0) -> Record:
     """Count held commands as known, cut to the used part, reject unusable data, and add a forcing that is given by a
-    formula."""
+    formula. `began` [s] is the record's zero since 1970: the used part may be told by either."""
     record = with_held_commands(record)
     if (part := signals.part(record.name)) != WHOLE:
-        record = record.cut(*part)
+        record = record.cut(*(time - began if time >= CALENDAR else time for time in part))
     for role, channel in record.channels.items():
         finite = np.isfinite(channel.value)
         if not finite.all():

@@ -135,6 +135,8 @@ class Record(Result):
         declared rate.
     one_clock
         Whether all channels are columns of one table with one time, so that there is no clock drift between them.
+    use_zero
+        Time [s] of the record's zero on the clock on which `use:` counts: that of a table that did not start with it.
 
     Examples
     --------
@@ -167,6 +169,7 @@ class Record(Result):
     whole: str = ""
     stamped: bool = True
     one_clock: bool = False
+    use_zero: float = 0.0
 
     @property
     def channels(self) -> dict[str, Channel]:

@@ -46,13 +46,13 @@ def rests_of(record: Record) -> tuple[str, ...]:
 
 
 def use_line(record: Record) -> str | None:
-    """The line of signals.yaml that excludes such rests; None where there are none."""
+    """The line of signals.yaml that excludes such rests, on the clock of `use:`; None where there are none."""
     time, free, end = record.output.time, freed(record), stop(record)
     if free is None and end is None:
         return None
     first = math.floor(time[0]) if free is None else free.begin
     last = math.ceil(time[-1]) if end is None else end
-    return f"use: [{_written(first)}, {_written(last)}]"
+    return f"use: [{_written(first + record.use_zero)}, {_written(last + record.use_zero)}]"
 
 
 def stop(record: Record) -> float | None:

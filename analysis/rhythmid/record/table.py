@@ -17,6 +17,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
 from rhythmid.record.counter_wrap import unwrapped
 from rhythmid.record.excel_table import EXCEL, read_excel
+from rhythmid.record.folder_of_tables import is_folder_of_tables, read_folder
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.hdf5_table import NUMBERS, is_hdf5, read_hdf5
 from rhythmid.record.joined_stamps import with_joined_stamps
@@ -26,12 +27,14 @@ from rhythmid.record.matlab_class import signals_of
 from rhythmid.record.matlab_objects import complaint_of_objects
 from rhythmid.record.own_process import arrays_in_own_process
 from rhythmid.record.placeholder import Placeholder, without_placeholders
+from rhythmid.record.rows_without_time import without_untimed_rows
 from rhythmid.record.table_clock import is_called_time
 from rhythmid.record.text_file import COMPRESSED
 from rhythmid.record.text_table import TEXT, text_table
 
 HDF5 = (".h5", ".hdf5")
 SUFFIXES = (".mat", *HDF5, ".npz", ".npy", ".parquet", *EXCEL, *JSON, *TEXT)
+OF_OBJECTS = "it holds Python objects, which are code and are not opened; write its arrays by  numpy.savez(FILE, q=q, tau=tau)"
 WIDEST = 64  # columns of an array above which it is an image or a scan, not joints
 LABELLED = (
     ("label", "values"),
@@ -40,8 +43,15 @@ LABELLED = (
 ONE_OF_MANY = re.compile(r"(.+)\[(\d+)\]")  # dof_pos[3]: one column of an array
 
 
+def is_table(path: Path) -> bool:
+    """Whether a path is named as a table, or is a folder with the tables of one recording."""
+    return table_suffix(path) in SUFFIXES or is_folder_of_tables(path)
+
+
 def table_name(path: Path) -> str:
-    """The name of a table's file without its suffixes: `run` for `run.csv.gz`."""
+    """The name of a table's file without its suffixes: `run` for `run.csv.gz`; a folder's own name."""
+    if path.is_dir():
+        return path.resolve().name
     return Path(path.stem).stem if table_suffix(path) != path.suffix.lower() else path.stem
 
 
@@ -70,17 +80,21 @@ class Table:
             ".mat": _mat, ".npz": _npz, ".npy": _npy, ".parquet": _parquet, **dict.fromkeys(HDF5, read_hdf5), **dict.fromkeys(JSON, read_json),
             **dict.fromkeys(TEXT, text_table), **dict.fromkeys(EXCEL, read_excel),
         }  # fmt: skip
-        read = readers.get(table_suffix(path))
+        read = readers.get(table_suffix(path), text_table if is_folder_of_tables(path) else None)
         if read is None:
             refuse_foreign(path)
             raise InputError(
                 f"{path}: is not a table; .mat, {', '.join(HDF5)}, .npz, .npy, .parquet, {', '.join((*EXCEL, *JSON, *TEXT))} can be read"
             )
         try:
-            check_content(path)
-            found = read(path)
+            if is_folder_of_tables(path):
+                found = read_folder(path, lambda file: list(cls.load(file).vectors()))
+            else:
+                check_content(path)
+                found = read(path)
             columns, notes = found if isinstance(found, tuple) else (found, ())
-            columns = with_joined_stamps(columns)
+            columns, untimed = without_untimed_rows(with_joined_stamps(columns))
+            notes = (*notes, *untimed)
         except FileNotFoundError:
             raise InputError(f"{path}: no such file") from None
         except InputError:
@@ -267,9 +281,12 @@ def _npz(path: Path) -> dict[str, Any]:
 
 def _npy(path: Path) -> dict[str, Any]:
     """The columns of an array by index, or the fields of a record array by name."""
-    array = np.array(
-        np.load(path, allow_pickle=False, mmap_mode="r")
-    )  # it rejects a file that claims to be longer than it is
+    try:  # it rejects a file that claims to be longer than it is
+        array = np.array(np.load(path, allow_pickle=False, mmap_mode="r"))
+    except ValueError as error:
+        if "object" not in str(error).lower():
+            raise
+        raise ValueError(OF_OBJECTS) from None
     if array.dtype.names:
         return {name: array[name] for name in array.dtype.names}
     array = _upright(array)

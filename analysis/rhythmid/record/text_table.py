@@ -25,6 +25,7 @@ from rhythmid.record.lvm_head import lvm_head
 from rhythmid.record.measured_cells import is_measured, measured
 from rhythmid.record.optional_cells import optional_cells
 from rhythmid.record.settings_above import without_settings
+from rhythmid.record.stated_above import stated_above
 from rhythmid.record.text_cells import COMMENTS, cells_of, content, is_missing, is_number, number_of
 from rhythmid.record.text_file import opened
 from rhythmid.record.text_head import names_of
@@ -164,6 +165,7 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
         line = used[last - 1][0] + 1
         raise InputError(f"{name}: line {line} has {len(head)} columns, the rows have {len(cells)}")
     head, notes = _told_apart(head, used[last - 1][0] + 1 if last else 1)
+    settings = {**stated_above(lines[: used[place][0]]), **settings}
     return Dialect(
         separator,
         decimal,

@@ -24,4 +24,4 @@ def counted_from(record: Record, origin: float) -> Record:
     if origin == 0.0 or record.forcing_law is not None:
         return record
     moved = {role: replace(one, time=one.time - origin) for role, one in record.channels.items()}
-    return replace(record, **moved)
+    return replace(record, use_zero=origin, **moved)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.signals import Clock, Signals
-from rhythmid.record.table import SUFFIXES, Table, table_suffix
+from rhythmid.record.table import Table, is_table
 from rhythmid.record.table_clock import is_further_time, named_clock
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ def read_clock_notes(source: Path, signals: Signals) -> list[str]:
         return []
     files = {channel.file or source for channel in signals.channels.values()}
     found: list[str] = []
-    for file in sorted(one for one in files if table_suffix(one) in SUFFIXES):
+    for file in sorted(one for one in files if is_table(one)):
         table = Table.load(file)
         try:
             chosen = table.column(name)

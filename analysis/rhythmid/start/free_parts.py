@@ -28,10 +28,10 @@ def free_parts(sources: Sequence[str | Path], signals: Signals) -> tuple[str, tu
 
 
 def _part(record: Record, begin: float | None) -> str:
-    """The part of a record from a time [s] on, of all of it where that is None."""
-    time = record.output.time
-    first = math.floor(time[0]) if begin is None else round(begin, 3)
-    return f"[{first:.12g}, {math.floor(time[-1]) + 1:.12g}]"
+    """The part of a record from a time [s] on, of all of it where that is None, on the clock of `use:`."""
+    time, zero = record.output.time, record.use_zero
+    first = math.floor(time[0] + zero) if begin is None else round(begin + zero, 3)
+    return f"[{first:.12g}, {math.floor(time[-1] + zero) + 1:.12g}]"
 
 
 def _read(source: str | Path, signals: Signals) -> Record | None:

@@ -27,7 +27,7 @@ WORDS: dict[Quantity, frozenset[str]] = {
         "accelerazione aceleracao beschleunigung".split()
     ),
     "effort": frozenset(
-        "effort efforts torque torques tor torq tau force forces wrench current currents cur voltage volt volts pwm duty trq "
+        "effort efforts torque torques tor torq tau force forces wrench current currents cur curr voltage volt volts pwm duty trq "
         "moment iq drehmoment kraft strom spannung couple coppia fuerza forza forca corriente corrente courant tensione tensao".split()
     ),
 }  # fmt: skip
@@ -91,7 +91,7 @@ POSED = frozenset(
 DUTY = frozenset("pwm duty".split())  # of a bridge: it is set, no sensor measures it
 ELECTRICAL = {
     "V": "voltage volt volts spannung tensione tensao",
-    "A": "current currents cur iq amp amps i strom corriente corrente courant",
+    "A": "current currents cur curr iq amp amps i strom corriente corrente courant",
     "1": "pwm duty",
 }
 IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "tf2_msgs/", "trajectory_msgs/", "control_msgs/")

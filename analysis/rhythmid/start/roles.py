@@ -25,6 +25,7 @@ from rhythmid.start.meaning import (
     meaning_of,
     says_who_asks,
 )
+from rhythmid.start.poses import with_joint_positions
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along, runs_like_a_clock
 from rhythmid.start.role_choice import Ask, Choice, Known, pick, ranked_by_worth
 from rhythmid.start.rotary import rotary_of, rotary_of_wrench
@@ -70,7 +71,9 @@ def guess_roles(
     known = [
         Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one) and not _is_clock(one)
     ]
-    known, twice = written_once(without_slopes(with_symbols(_without_empty_letters(known))))
+    known, twice = written_once(
+        without_slopes(with_symbols(_without_empty_letters(with_joint_positions(known))))
+    )
     everything = [*known, *(Known(one, meaning_of(one)) for one in found.constant)]
     known, resting = (with_targets(part, everything) for part in (known, everything[len(known) :]))
     if not known:

@@ -29,6 +29,7 @@ from rhythmid.start.no_motion import NoMotionError
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
 from rhythmid.start.one_force_unit import by_command_alone
 from rhythmid.start.other_effort import by_other_effort
+from rhythmid.start.poses import with_numbers_as_joints, without_quaternions
 from rhythmid.start.role_choice import Ask, Choice
 from rhythmid.start.roles import Roles, first_answer, guess_roles
 from rhythmid.start.sides import with_sides
@@ -133,7 +134,9 @@ def guess(
 ) -> Guess:
     """Inspect one recording and guess the roles of its channels; parameters and errors as for `start`. What is constant in
     it may change from one to the next of the recordings `beside` it."""
-    found = with_joints(with_sides(with_listed_joints(_inventory(source, rate))))
+    found = with_joints(
+        with_sides(with_listed_joints(with_numbers_as_joints(without_quaternions(_inventory(source, rate)))))
+    )
     roles = guess_roles(found, joint, ask)
     if (
         beside

@@ -11,11 +11,13 @@ import numpy as np
 from rhythmid.elements.element import SLOTS
 from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Term
+from rhythmid.record.clock_time import DAY
 from rhythmid.record.heading import heading_of
 from rhythmid.record.held_command import held_note
 from rhythmid.record.inventory import Inventory, Recorded, header_clock
 from rhythmid.record.record import Channel
 from rhythmid.record.signals import ROLES, Clock
+from rhythmid.record.table_clock import UNITS
 from rhythmid.start.meaning import driving_unit_of, is_measured_effort, meaning_of, tells_unit
 from rhythmid.start.nominal import Nominal
 from rhythmid.start.role_choice import Choice
@@ -25,6 +27,7 @@ from rhythmid.value import Value
 
 GUESSED = "guessed signals.yaml"  # name in messages of the file that is not written yet
 WIDTH = 110
+SCALES = {DAY, *(scale for scale, _ in UNITS)}  # of times, one of which is guessed where none is stated
 LISTED = 8  # largest number of alternatives in a comment
 MEANS = {
     "input": "what drives the machine", "output": "the measured motion", "velocity": "its velocity, as recorded beside it",
@@ -119,7 +122,7 @@ def _time_doubt(clock: Clock) -> list[str]:
     heading = heading_of(str(clock.column))
     if clock.kind == "column" and heading.unit and heading.scale != clock.scale:
         return comment(f"  CHECK: the unit of its heading, {heading.written}, is not the one that is taken.")
-    if clock.kind != "column" or clock.scale == 1.0 or heading.unit:
+    if clock.kind != "column" or clock.scale not in SCALES or heading.unit:
         return []
     return comment(
         "  CHECK: no heading tells the unit of the times; the size of their steps is all that says it."

@@ -1,0 +1,76 @@
+"""A folder with one table for each stream of a recording."""
+
+import numpy as np
+import pytest
+
+from rhythmid.errors import InputError
+from rhythmid.record.inventory import inventory
+from rhythmid.record.load import load
+from rhythmid.start.start import start
+
+BEGAN = 1.5e9
+
+
+def stream(folder, name, rate, columns, began=BEGAN, duration=8.0):
+    """Write `name`.csv with columns of the time [s], from stamps of its own."""
+    rng = np.random.default_rng(len(name))
+    time = np.sort(
+        np.arange(0.0, duration, 1.0 / rate) + rng.uniform(0.0, 0.2 / rate, round(duration * rate))
+    )
+    table = np.column_stack([began + time, *(law(time) for law in columns.values())])
+    folder.mkdir(exist_ok=True)
+    np.savetxt(
+        folder / f"{name}.csv",
+        table,
+        delimiter=",",
+        fmt="%.9f",
+        header=",".join(["time", *columns]),
+        comments="",
+    )
+
+
+def arm(folder):
+    """The log of an arm with two joints: measured and commanded angles and the currents, each in its own table."""
+    first, second = (lambda t: 0.4 * np.sin(3.0 * t)), (lambda t: 0.2 * np.cos(2.0 * t))
+    stream(folder, "state", 100.0, {"j0": first, "j1": second})
+    stream(folder, "cmd", 50.0, {"j0": lambda t: first(t + 0.05), "j1": lambda t: second(t + 0.05)})
+    stream(
+        folder,
+        "motor",
+        90.0,
+        {"curr0": lambda t: 2.0 * np.sin(3.0 * t + 0.1), "curr1": lambda t: np.cos(2.0 * t + 0.1)},
+    )
+    (folder / "empty.csv").write_text("time,x\n", encoding="utf-8")
+    return folder
+
+
+def test_the_tables_of_one_recording_are_read_as_one_and_each_keeps_its_stamps(tmp_path):
+    begun = start([arm(tmp_path / "log")])
+    roles = {role: choice.recorded.column for role, choice in begun.guess.roles.choices.items()}
+    assert roles["output"] == "state.j0" and "motor.curr0" in roles.values()
+    assert any("empty.csv" in note for note in begun.guess.inventory.notes)
+    (tmp_path / "signals.yaml").write_text(begun.signals, encoding="utf-8")
+    record = load(tmp_path / "log", tmp_path / "signals.yaml")
+    assert (record.name, len(record.output)) == ("log", 800)
+    np.testing.assert_allclose(
+        record.output.value, 0.4 * np.sin(3.0 * (record.output.time + _first(tmp_path))), atol=1e-4
+    )
+
+
+def _first(folder):
+    """Time [s] of the first row of the tables after the beginning."""
+    return min(
+        float(np.loadtxt(one, delimiter=",", skiprows=1, ndmin=2)[0, 0]) - BEGAN
+        for one in (folder / "log").glob("[!e]*.csv")
+    )
+
+
+def test_runs_of_one_layout_and_runs_at_different_times_are_refused(tmp_path):
+    for number in (1, 2):
+        stream(tmp_path / "runs", f"run{number}", 100.0, {"angle": np.sin}, began=0.0)
+    with pytest.raises(InputError, match="same columns, so that they are several recordings"):
+        inventory(tmp_path / "runs")
+    stream(tmp_path / "days", "arm", 100.0, {"angle": np.sin})
+    stream(tmp_path / "days", "motor", 100.0, {"current": np.sin}, began=BEGAN + 86400.0)
+    with pytest.raises(InputError, match="not recorded at the same time"):
+        inventory(tmp_path / "days")
