@@ -259,3 +259,15 @@ def test_gravity_of_an_angle_is_not_guessed_where_nothing_drives_a_machine_that_
     found = start([tmp_path / "run.npz"])
     assert labels(found) == {"constant_force", "viscous_damper"}
     assert found.nominal.model.value("constant_force.force") == pytest.approx(pulled, rel=0.3)
+
+
+def test_a_drive_that_is_switched_off_where_the_record_ends_is_a_constant_one(tmp_path):
+    time = 0.004 * np.arange(5000)
+    force = np.where(np.arange(5000) < 4985, 1.0, 0.0)
+    decay, own = 0.6, np.sqrt(67.0 - 0.6**2)
+    position = 0.5 * (1.0 - np.exp(-decay * time) * (np.cos(own * time) + decay / own * np.sin(own * time)))
+    np.savez(tmp_path / "step.npz", t=time, force=force, x=position)
+    found = start([tmp_path / "step.npz"])
+    assert "linear_spring" in labels(found)
+    assert found.nominal.model.value("linear_spring.stiffness") == pytest.approx(2.0, rel=0.02)
+    assert found.nominal.model.mass.value == pytest.approx(2.0 / 67.0, rel=0.1)

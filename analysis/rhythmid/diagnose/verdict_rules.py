@@ -112,6 +112,15 @@ def _of_search(statistic: Callable[[Outcome], float], cut_short: bool) -> Callab
 
 VERDICT_RULES: tuple[VerdictRule, ...] = (
     VerdictRule(
+        "astray_of_all",
+        "the autocorrelated part of the error of the chosen hypothesis, as a share of what was measured: beyond 1 a constant would predict better",
+        1.0,
+        "undecided",
+        "with every effect that was tried the model is farther from the records than their mean is: something that was not recorded may act, or units, "
+        "signs or the structure of the model are wrong",
+        lambda found: found.lost,
+    ),
+    VerdictRule(
         "lost",
         "the autocorrelated part of the error of the chosen hypothesis, as a share of what was measured",
         MAINLY,

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
-from rhythmid.identify.inverse_dynamics.motion import Motion, high_pass, low_pass, motion_of, stretches
+from rhythmid.identify.inverse_dynamics.motion import Motion, Stretch, high_pass, low_pass, motion_of, stretches
 from rhythmid.model import Model
 from rhythmid.record.back_and_forth import goes_back_and_forth
 from rhythmid.record.record import Record
@@ -82,15 +82,19 @@ class Rows:
         signal."""
         raw = stretches(records, bare)
         chosen = bandwidth_of(raw, bare)
-        motions = [motion_of(one, bare, chosen.motion, chosen.low) for one in raw]
-        motions = [one for one in motions if len(one.time) >= LEAST_ROWS]
-        if not motions:
+        every = [(motion_of(one, bare, chosen.motion, chosen.low), one) for one in raw]
+        every = [(motion, one) for motion, one in every if len(motion.time) >= LEAST_ROWS]
+        if not every:
             raise InputError("the records are too short for a balance of forces")
+        motions = [motion for motion, _ in every]
         fast = float(np.quantile(np.abs(np.concatenate([one.leg_velocity for one in motions])), 0.95))
+        margins = tuple(min(int(1.0 / (chosen.effort * one.period)), len(one.time) // 8) for one in motions)
         made = [_filtered(one, chosen, SLOW * fast) for one in motions]
+        for both, (motion, one), margin in zip(made, every, margins, strict=True):
+            if (level := _level(one, motion.time[margin], motion.time[-1 - margin])) is not None:
+                both[:, 0] = level
         return cls(
-            tuple(both[:, 0] for both in made), tuple(both[:, 1:] for both in made), tuple(one.period for one in motions),
-            tuple(min(int(1.0 / (chosen.effort * one.period)), len(one.time) // 8) for one in motions),
+            tuple(both[:, 0] for both in made), tuple(both[:, 1:] for both in made), tuple(one.period for one in motions), margins,
             max(float(np.ptp(one.leg_position)) for one in motions), chosen, motions[0].driven_by_base,
         )  # fmt: skip
 
@@ -192,6 +196,15 @@ class Rows:
             2.0 * float(solved.cost) / power,
             delay,
         )
+
+
+def _level(one: Stretch, begin: float, end: float) -> float | None:
+    """The force that drives without a change from `begin` to `end` [s], such as one that is switched off where the recording
+    ends: only the filter spreads that change over the rows. None where it changes, or a base drives."""
+    within = one.drive[(one.time >= begin) & (one.time <= end)]
+    if one.kind != "force" or not len(within) or np.ptp(within) > STEADY * np.abs(within).max():
+        return None
+    return float(within[0])
 
 
 def _filtered(one: Motion, bandwidth: Bandwidth, slow: float) -> Array:

@@ -27,7 +27,7 @@ from rhythmid.value import Value
 
 GUESSED = "guessed signals.yaml"  # name in messages of the file that is not written yet
 WIDTH = 110
-SCALES = {DAY, *(scale for scale, _ in UNITS)}  # of times, one of which is guessed where none is stated
+SCALES = {DAY, *(scale for scale, _ in UNITS[1:])}  # of times that are not in seconds, where none is stated
 LISTED = 8  # largest number of alternatives in a comment
 MEANS = {
     "input": "what drives the machine", "output": "the measured motion", "velocity": "its velocity, as recorded beside it",
