@@ -29,7 +29,8 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
             contest(supposed("", predicted(SIZE**2)), friction((0.8 * SIZE) ** 2)), structured_after=0.9
         ),
         "astray_of_all": replace(
-            contest(supposed("", predicted((1.5 * SIZE) ** 2)), friction((1.4 * SIZE) ** 2)), structured_after=0.99
+            contest(supposed("", predicted((1.5 * SIZE) ** 2)), friction((1.4 * SIZE) ** 2)),
+            structured_after=0.99,
         ),
         "few_blocks": contest(
             supposed("", predicted(1.0, 0.0, mood=0.0)), supposed("friction", predicted(0.5, 4.2, mood=0.18))

@@ -13,7 +13,14 @@ from scipy.signal import lfilter
 
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
-from rhythmid.identify.inverse_dynamics.motion import Motion, Stretch, high_pass, low_pass, motion_of, stretches
+from rhythmid.identify.inverse_dynamics.motion import (
+    Motion,
+    Stretch,
+    high_pass,
+    low_pass,
+    motion_of,
+    stretches,
+)
 from rhythmid.model import Model
 from rhythmid.record.back_and_forth import goes_back_and_forth
 from rhythmid.record.record import Record
