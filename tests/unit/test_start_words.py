@@ -8,7 +8,8 @@ import pytest
 from foreign import joint_state, moved, roles_of, servo, tones
 
 from rhythmid.errors import InputError
-from rhythmid.start.meaning import words_of
+from rhythmid.record.inventory import Recorded
+from rhythmid.start.meaning import force_unit_of, words_of
 from rhythmid.start.start import guess, start
 
 TIME = np.arange(8000) * foreign.STEP
@@ -213,3 +214,18 @@ def test_the_effort_that_goes_best_with_the_output_is_doubted_where_it_hardly_do
 def test_the_letter_of_an_array_of_named_signals_tells_nothing():
     assert words_of('Y[2]."Model Root"/"Switch2"/"Out1"') == words_of('"Model Root"/"Switch2"/"Out1"')
     assert words_of("q[2]") == ["q", "2"]
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("curr_0", "A"),
+        ("motor_current", "A"),
+        ("torque_current", "A"),
+        ("current_torque", ""),
+        ("curr_force", ""),
+        ("voltage_cmd", "V"),
+    ],
+)
+def test_the_last_word_for_an_effort_says_its_unit(name, unit):
+    assert force_unit_of(Recorded(name, TIME, FORCE, column=name)) == unit

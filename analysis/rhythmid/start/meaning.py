@@ -88,6 +88,9 @@ POSED = frozenset(
     "des desired ref refs reference references target targets goal goals setpoint setpoints sp soll sollwert "
     "consigne consigna referencia riferimento".split()
 )  # for a motion, where nothing else is stated
+MECHANICAL = FORCES | frozenset(
+    "torque torques tor torq tau trq moment drehmoment kraft couple coppia fuerza forza forca".split()
+)
 DUTY = frozenset("pwm duty".split())  # of a bridge: it is set, no sensor measures it
 ELECTRICAL = {
     "V": "voltage volt volts spannung tensione tensao",
@@ -207,8 +210,12 @@ def force_unit_of(one: Recorded) -> str:
     """Unit of the driving signal, by its heading or a word for a motor's supply; empty where neither states it."""
     if one.unit:
         return one.unit
-    words = {*words_of(one.said), *words_of(one.topic)}
-    return next((unit for unit, names in ELECTRICAL.items() if words & set(names.split())), "")
+    for word in (*reversed(words_of(one.said)), *reversed(words_of(one.topic))):
+        if unit := next((unit for unit, names in ELECTRICAL.items() if word in names.split()), ""):
+            return unit
+        if word in MECHANICAL:  # the present torque, not a current
+            return ""
+    return ""
 
 
 def tells_unit(one: Recorded) -> bool:
