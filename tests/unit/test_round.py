@@ -1,5 +1,7 @@
 """A round of the search scores the catalogue at the fit that it returns."""
 
+import math
+
 import pytest
 
 import rhythmid as rh
@@ -74,3 +76,20 @@ def test_a_resonance_that_no_candidate_knows_is_not_the_noise_s_colour():
     # most of what is left follows from the past motion, and is no noise
     assert moved.noise.variance < 0.3 * fit.noise.variance
     assert moved.chi2 > 3.0 * moved.samples
+
+
+def test_a_vibration_at_the_frequency_of_a_free_motion_is_no_candidate():
+    """It would explain most of what friction does to a decay, and is never told from it."""
+    library = load_catalogue()
+    model = rh.Model.from_text(SPRING)
+    rubbing = model.with_element(library["coulomb_friction"], {"force": 0.3})
+    released = {"duration": 12.0, "excitation": {"type": "silence", "length": 12.0}, "forcing": {"amplitude": 0.0},
+                "initial": {"position": 0.1, "velocity": 0.0}, "noise": {"measurement_std": 1e-5}}  # fmt: skip
+    fit = estimate(model, prepare([rh.simulate(rubbing, released).record]))
+    catalogue = Catalogue({name: library[name] for name in ("periodic_disturbance", "coulomb_friction")})
+    found, _ = one_round(fit, (), catalogue, None)
+    own = math.sqrt(60.0) / (2.0 * math.pi)  # Hz
+    lines = [one.values["frequency"] for one in found.scores if one.element.name == "periodic_disturbance"]
+    assert lines
+    assert min(abs(one - own) for one in lines) > 1.0 / 12.0
+    assert found.scores[0].element.name == "coulomb_friction"

@@ -222,6 +222,15 @@ def test_a_weight_that_is_moved_up_and_down_is_a_constant_force_of_the_nominal_m
     assert found.nominal.model.value("constant_force.force") == pytest.approx(-5.0, rel=0.1)
 
 
+def test_a_constant_force_is_estimated_beside_the_dry_friction_that_prevails_in_one_direction(tmp_path):
+    force = np.where(TIME % 4.0 < 3.0, 9.0 + np.sin(5.0 * TIME), -5.0)  # mostly forwards
+    found = begun(tmp_path, force + 4.0, moved(force, 0.5, 0.8, 0.0, 4.0)[0])
+    assert found.nominal.model.value("constant_force.force") == pytest.approx(-4.0, abs=0.4)
+    assert found.nominal.model.value("inertia.mass") == pytest.approx(0.5, rel=0.2)
+    (remark,) = found.nominal.remarks
+    assert remark.startswith("No dry friction: beside the constant part ")
+
+
 def test_no_spring_is_guessed_where_nothing_drives_a_machine_that_never_comes_back(tmp_path):
     speed = np.where(TIME < 1.0, 20.0 * TIME, 20.0 * np.exp(-0.4 * (TIME - 1.0)))
     np.savez(tmp_path / "run.npz", t=TIME, position=np.cumsum(speed) * foreign.STEP)

@@ -7,7 +7,7 @@ frequency of a free motion it is equivalent to another damping or stiffness.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,7 +38,7 @@ def shape_of(model: Model, added: Sequence[str], known: Trajectories, sizes: Sca
         each = {
             "within_bounds": within_bounds(term, sizes),
             "acts_within_records": _acts_within(known, model, term),
-            "own_frequency": _own_frequency(term, sizes),
+            "own_frequency": own_frequency(term.element, term.numbers, sizes),
         }
         found = {name: min(value, found.get(name, math.inf)) for name, value in each.items()}
     return found
@@ -92,7 +92,7 @@ def _size(term: Term, sizes: Scales) -> float:
     return departure(term) / usual if usual > 0.0 else math.inf
 
 
-def _own_frequency(term: Term, sizes: Scales) -> float:
+def own_frequency(element: Element, values: Mapping[str, float], sizes: Scales) -> float:
     """Distance of a vibration, or of a resonance as narrow as a spectral line, from the forcing's harmonics.
 
     In a free motion, the distance from the frequencies of the motion. In frequency resolutions of the records; infinite for other
@@ -100,10 +100,10 @@ def _own_frequency(term: Term, sizes: Scales) -> float:
     """
     forcing, line = sizes.forcing_frequency, 1.0 / sizes.duration
     free = forcing <= 0.0 and sizes.idle
-    if term.element.kernel is None or (forcing <= 0.0 and not free):
+    if element.kernel is None or (forcing <= 0.0 and not free):
         return math.inf
-    found = [term.values[one.name].value for one in term.element.parameters if one.unit == "Hz"]
-    damping = term.values[term.element.width].value if term.element.width else 0.0
+    found = [values[one.name] for one in element.parameters if one.unit == "Hz"]
+    damping = values[element.width] if element.width else 0.0
     low, high = min(sizes.frequency, sizes.swings[0] or math.inf), max(sizes.frequency, sizes.swings[1])
     apart = [
         max(low - f, f - high, 0.0) if free else abs(f - round(f / forcing) * forcing)

@@ -111,7 +111,7 @@ def read_record(
 
 def read_bag(bag: Bag, signals: Signals | None = None, opened: Opened | None = None) -> Record:
     """Read a record from a bag. Raises InputError as `read_record` does."""
-    chosen = signals or Signals.default()
+    chosen = (signals or Signals.default()).of_record(bag.name)
     wanted = fields_of(chosen)
     bag, columns, run = (opened or Opened()).bag(bag, wanted)
     description, notes = _description(run)
@@ -147,7 +147,11 @@ def read_tables(signals: Signals, opened: Opened | None = None) -> Record:
             raise InputError(
                 f"{source.place}'file:' is missing: whose column is it? Or give the table, and this file with --signals"
             )
-    opened = opened or Opened()
+    assert signals.path is not None
+    name = table_name(signals.path)
+    if name == "signals":  # the folder's name is more specific
+        name = signals.path.resolve().parent.name
+    signals, opened = signals.of_record(name), opened or Opened()
     tables = {
         file: opened.table(file) for source in signals.channels.values() if (file := source.file) is not None
     }
@@ -176,10 +180,6 @@ def read_tables(signals: Signals, opened: Opened | None = None) -> Record:
         if merged[source.file] or is_sampled_rarely(value):  # its empty cells are no samples
             time, value = time[~np.isnan(value)], value[~np.isnan(value)]
         made[role] = Samples(source, time, value, placeholder=table.placeholder(source.column))
-    assert signals.path is not None
-    name = table_name(signals.path)
-    if name == "signals":  # the folder's name is more specific
-        name = signals.path.resolve().parent.name
     clocks = {(source.file, source.clock(signals.time)) for source in signals.channels.values()}
     first = min((float(samples.time.min()) for samples in made.values() if len(samples.time)), default=0.0)
     told = [note for table in tables.values() for note in table.notes]
@@ -253,7 +253,7 @@ def _from_columns(
 @np.errstate(over="ignore", invalid="ignore")  # for numbers near the largest, and NaN of every kind
 def _in_unit(value: NDArray[np.float64], source: Source) -> NDArray[np.float64]:
     """Values (n,) in SI or model units. Impossible ones, as from damaged bytes, become infinite and are rejected."""
-    value = signed(value, source.sign_bit) * source.scale + source.offset
+    value = signed(value, source.sign_bit) * source.scale + source.one_offset
     return np.where(np.abs(value) > LARGEST, np.copysign(np.inf, value), value)
 
 

@@ -12,7 +12,8 @@
 A channel is a field of a topic, or a `column` of a `file` (.mat, .csv, .npz; relative to signals.yaml). `tables:
 {file: …}` names one file for all channels; without a file it is a column of the table that is read. `time:` may
 also be given for a single channel, for example for commands without stamps: `input: {topic: /command, field: data,
-time: receive}`. A channel's value is `scale` * recorded + `offset`, in `unit`. `sign_bit: 15` says that bit 15 of the
+time: receive}`. A channel's value is `scale` * recorded + `offset`, in `unit`; the offset of an encoder that is zeroed before each
+recording is given by record: `offset: {slow: 0, fast: 3.14}`. `sign_bit: 15` says that bit 15 of the
 recorded word is its sign. `input: none` declares that at most
 the forcing drives the machine. `forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}` states amplitude * cos(2π
 frequency t + phase) in the record's time. A model parameter with a different value in each record, such as a
@@ -90,7 +91,7 @@ class Source:
     file: Path | None = None
     column: str | int = ""
     scale: float = 1.0
-    offset: float = 0.0
+    offset: float | Mapping[str, float] = 0.0  # for several records, by record name
     sign_bit: int | None = None
     time: Clock | None = None
     place: str = ""  # "signals.yaml:3: input: ", as the start of a message
@@ -98,6 +99,23 @@ class Source:
     def clock(self, usual: Clock) -> Clock:
         """Source of its times: its own clock, else `usual`."""
         return self.time or usual
+
+    def of_record(self, record: str) -> "Source":
+        """The source with the offset of one record. Raises InputError where offsets by record lack it."""
+        if not isinstance(self.offset, Mapping):
+            return self
+        if record not in self.offset:
+            raise InputError(
+                f"{self.place}offset: has no value for {record!r}, only for {', '.join(self.offset)}"
+            )
+        return replace(self, offset=self.offset[record])
+
+    @property
+    def one_offset(self) -> float:
+        """The offset. Raises InputError where it differs by record and the record is not known, as on a live topic."""
+        if isinstance(self.offset, Mapping):
+            raise InputError(f"{self.place}offset: one number is needed here, not one for each record")
+        return self.offset
 
     def __str__(self) -> str:
         if self.topic:
@@ -140,12 +158,15 @@ class Signals:
         for name, value in self.parameters.items():
             if isinstance(value, Mapping):
                 if record not in value:
-                    raise InputError(
-                        f"{self.path}: parameters: {name}: has no value for the record {record!r}"
-                    )
+                    why = f"parameters: {name}: has no value for the record {record!r}"
+                    raise InputError(f"{self.path}: {why}")
                 value = value[record]
             found[name] = value
         return found
+
+    def of_record(self, record: str) -> "Signals":
+        """The same channels with the offsets of one record. Raises InputError where offsets by record lack this one."""
+        return replace(self, channels={role: one.of_record(record) for role, one in self.channels.items()})
 
     def part(self, record: str) -> Part:
         """The part of a record that is used. Raises InputError where the parts by record lack this one."""
@@ -230,6 +251,7 @@ def _of_a_channel(_: Any) -> None:
 
 
 Column = Annotated[str | int, BeforeValidator(_column)]
+ByRecord = Annotated[Annotated[dict[Word, Number], InKeys] | Annotated[Number, Plain], ByShape]
 
 
 @dataclass(frozen=True)
@@ -255,7 +277,7 @@ class _Channel:
     time: AnyClock | None = None
     unit: Annotated[str, AfterValidator(_of_si)] | None = None
     scale: Annotated[Number, AfterValidator(_some)] = 1.0
-    offset: Number = 0.0
+    offset: ByRecord = 0.0
     sign_bit: Annotated[int, Limits(ge=1, le=63)] | None = None
 
 
@@ -305,9 +327,7 @@ class _Document:
     reference: Annotated[_Channel | None, Absent] = None
     use: Annotated[Annotated[dict[Word, Range], InKeys] | Annotated[Range, Plain], ByShape] = WHOLE
     tables: _Tables | None = None
-    parameters: dict[
-        str, Annotated[Annotated[dict[str, Number], InKeys] | Annotated[Number, Plain], ByShape]
-    ] = field(default_factory=dict)
+    parameters: dict[str, ByRecord] = field(default_factory=dict)
 
 
 _DOCUMENT: TypeAdapter[_Document] = TypeAdapter(_Document)
@@ -337,9 +357,8 @@ def _signals(document: Node, path: Path) -> Signals:
         document.fail("'time:' is missing; for a table it is {sample_rate: 1000} in Hz or {column: t}")
     law = given.forcing if isinstance(given.forcing, Sinusoid) else None
     hold = None if given.input is None else given.input.hold
-    return Signals(
-        channels, clock, law, kind, measured, hold, given.use, path=path, parameters=given.parameters
-    )
+    own = given.parameters
+    return Signals(channels, clock, law, kind, measured, hold, given.use, path=path, parameters=own)
 
 
 def _source(
@@ -363,9 +382,8 @@ def _source(
         node.fail("'topic:' is missing: whose field is it?")
     if given.column is None:
         node.fail("give topic and field (of a bag) or file and column (of a .mat, .csv or .npz table)")
-    return replace(
-        made, file=default_file if given.file is None else folder / given.file, column=given.column
-    )
+    file = default_file if given.file is None else folder / given.file
+    return replace(made, file=file, column=given.column)
 
 
 def _clock(node: Node, given: _Clock | Literal["header", "receive"], tables: bool) -> Clock:

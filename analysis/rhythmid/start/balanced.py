@@ -114,6 +114,14 @@ def _reversed(records: Sequence[Record], rows: Rows, law: Law, rotary: bool) -> 
     return (turned, kind) if turned.earns_place(rows.reversed.fit(rest, turned.delay)) else None
 
 
+def rest_of(law: Law, kind: str) -> float | None:
+    """Where the restoring force of a balance vanishes: the rest of a spring, or where a pendulum hangs; None without one."""
+    found = law.coefficients
+    if kind == "spring":
+        return -found.get("constant", 0.0) / found["position"]
+    return math.atan2(-found.get("cosine", 0.0), found["sine"]) if kind == "pendulum" else None
+
+
 def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
     """The balance with the restoring force, if there is one: a spring, or gravity of a pendulum.
 
@@ -121,7 +129,8 @@ def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: boo
     spring is identifiable from it only where the motion returns, and so it is where nothing drives the machine: along a motion of
     one direction it is told neither from damping nor from a push, and no more is gravity's sine within a turn. Each force has to explain clearly more even beside dry
     friction, which every machine may have: a spring partly absorbs it, and in a motion of one direction a constant is the same,
-    but would move the machine where it rests. Where friction is the better of the two, it is in the law and no kind of its own.
+    but would move the machine where it rests. Where friction is the better of the two, or is needed beside a constant, it is in the law and
+    no kind of its own.
     """
     measured = all(record.output_kind == "position" for record in records)
     moving = ["acceleration", "velocity"] if inertial else ["velocity"]
@@ -148,8 +157,13 @@ def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: boo
         del options["spring"]
     law, kind = plain, "free"
     if options["constant"].earns_place(law):
-        against, both = (rows.fit([*moving, *more, "friction"], delay, moving=True) for more in ((), level))
+        against, both, steady = (
+            rows.fit([*moving, *more], delay, moving=True)
+            for more in (["friction"], [*level, "friction"], level)
+        )
         law, kind = (options["constant"], "constant") if both.earns_place(against) else (against, "free")
+        if kind == "constant" and both.earns_place(steady):
+            law = both  # alone, the constant would take on the friction of the direction that prevails
     back = [name for name in ("spring", "pendulum") if name in options]
     if back:
         best = min(back, key=lambda name: options[name].left)

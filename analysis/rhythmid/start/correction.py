@@ -2,8 +2,8 @@
 them, with a CHECK comment, so that the values that it writes are those of the signals that it writes."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,18 +21,27 @@ OF_LOAD = ("N", "N*m")  # units of efforts in which a constant may as well be a 
 
 @dataclass(frozen=True)
 class Correction:
-    """A channel's value is `scale` times that as recorded, plus `offset`; `why` as a CHECK comment."""
+    """A channel's value is `scale` times that as recorded, plus `offset`; `why` as a CHECK comment. `offsets` are those of single
+    records, by name, in place of `offset`."""
 
     role: str
     why: str
     scale: float = 1.0
     offset: float = 0.0
+    offsets: Mapping[str, float] = field(default_factory=dict)
 
     def of(self, choice: Choice) -> Choice:
         """The choice for the role with the correction added to its own."""
+        offset = self.scale * choice.offset + self.offset
+        own = {name: self.scale * one + self.offset for name, one in choice.offsets.items()}
+        own |= {name: offset + one for name, one in self.offsets.items()}
         return replace(
-            choice, scale=self.scale * choice.scale, offset=self.scale * choice.offset + self.offset, doubts=(*choice.doubts, self.why)
-        )  # fmt: skip
+            choice,
+            scale=self.scale * choice.scale,
+            offset=offset,
+            offsets=own,
+            doubts=(*choice.doubts, self.why),
+        )
 
 
 def corrected(roles: Roles, corrections: Sequence[Correction]) -> Roles:

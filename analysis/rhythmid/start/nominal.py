@@ -14,9 +14,10 @@ from rhythmid.identify.series import prepare
 from rhythmid.model import INERTIA, MASS, Model
 from rhythmid.record.record import Channel, Record
 from rhythmid.start.balance import LATEST_ACTION, Law, Rows
-from rhythmid.start.balanced import UNEXPLAINED, balance_of, restoring
+from rhythmid.start.balanced import UNEXPLAINED, balance_of, rest_of, restoring
 from rhythmid.start.correction import Correction, offset_of
 from rhythmid.start.meaning import is_measured_effort, tells_unit
+from rhythmid.start.own_zeros import own_zeros_of
 from rhythmid.start.roles import Roles
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
 from rhythmid.value import Prior, Value
@@ -156,11 +157,9 @@ def _forces(
     model: Model, law: Law, kind: str, rows: Rows, catalogue: Catalogue
 ) -> tuple[Model, dict[str, str]]:
     """The model with the elements besides the inertia that the balance shows."""
-    found, reasons = law.coefficients, {}
+    found, reasons, rest = law.coefficients, {}, rest_of(law, kind) or 0.0
     if kind == "spring":
-        stiffness = found["position"]
-        rest = -found.get("constant", 0.0) / stiffness
-        values = {"stiffness": _short(stiffness), "rest_length": _short(rest)}
+        values = {"stiffness": _short(found["position"]), "rest_length": _short(rest)}
         model = model.with_element(catalogue["linear_spring"], values)
         reasons["linear_spring"] = "a force proportional to the position brings it back"
         if model.units.position == "rad" and rows.span >= 2.0 * LEAST_SWING:
@@ -168,14 +167,12 @@ def _forces(
                 "; it explains more than a pendulum's gravity, which is pendulum_gravity: {moment: …}"
             )
         elif model.units.position == "rad":
-            reasons["linear_spring"] += (
-                "; at so small an angle a pendulum's gravity does the same: pendulum_gravity: {moment: …}"
-            )
+            small = "; at so small an angle a pendulum's gravity does the same: pendulum_gravity: {moment: …}"
+            reasons["linear_spring"] += small
     elif kind == "pendulum":
-        sine, cosine = found["sine"], found.get("cosine", 0.0)
-        moment, hanging = math.hypot(sine, cosine), math.atan2(-cosine, sine)
+        moment = math.hypot(found["sine"], found.get("cosine", 0.0))
         model = model.with_element(
-            catalogue["pendulum_gravity"], {"moment": _short(moment), "reference": _short(hanging)}
+            catalogue["pendulum_gravity"], {"moment": _short(moment), "reference": _short(rest)}
         )
         reasons["pendulum_gravity"] = (
             "a torque proportional to the sine of the angle explains more than a spring; reference: hanging"
@@ -199,10 +196,12 @@ def _friction(law: Law, units: Units) -> list[str]:
     force = law.coefficients.get("friction", 0.0)
     if force <= 0.0:
         return []
-    return [
-        f"No constant force: {force:.3g} {units.force} against the motion is needed for the balance, dry friction or a weight that it works "
-        "against. `diagnose` looks for it; put in what is known."
-    ]
+    told = f"{force:.3g} {units.force} against the motion is needed for the balance"
+    if "constant" in law.coefficients:
+        told = f"No dry friction: beside the constant part {told}"
+    else:
+        told = f"No constant force: {told}, dry friction or a weight that it works against"
+    return [f"{told}. `diagnose` looks for it; put in what is known."]
 
 
 def _controller(
@@ -356,13 +355,19 @@ def _alone(records: Sequence[Record], units: Units, catalogue: Catalogue, why: s
     """Model of a free decay, or of a machine on a moving base: all per unit of inertia."""
     model = _bare(units, 1.0, fixed=True)
     reasons = {INERTIA: f"{why}, so all is per unit of inertia"}
+
+    def balance(some: Sequence[Record]) -> tuple[Law, str]:
+        rows = Rows.of([_as_driven(one) for one in some], model)
+        return restoring(some, rows, units.position == "rad", inertial=False)
+
     try:
         rows = Rows.of([_as_driven(one) for one in records], model)
-        law, kind = restoring(records, rows, units.position == "rad", inertial=False)
+        law, kind = balance(records)
     except InputError as error:
         return _by_size(records, units, catalogue, str(error), fixed=True)
-    model, more = _forces(model, law, kind, rows, catalogue)
-    return Nominal(model, reasons | more, tuple(_friction(law, units)))
+    made, more = _forces(model, law, kind, rows, catalogue)
+    zeros = own_zeros_of(records, balance)
+    return Nominal(made, reasons | more, tuple(_friction(law, units)), corrections=zeros)
 
 
 def _as_driven(record: Record) -> Record:

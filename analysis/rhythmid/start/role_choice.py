@@ -1,7 +1,7 @@
 """Knowledge about recorded numbers while roles are assigned, and the choice for a role."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ CLOSE_WORTH = 0.7  # ratio to the best candidate's score above which the user is
 @dataclass(frozen=True, eq=False)
 class Choice:
     """The choice for a role, its reason, the alternatives, and doubts about it. Its values are `scale` times those of
-    the number, plus `offset`."""
+    the number, plus `offset`, or plus the one of `offsets` for a record where there are any."""
 
     recorded: Recorded
     reason: str
@@ -26,6 +26,7 @@ class Choice:
     doubts: tuple[str, ...] = ()
     scale: float = 1.0
     offset: float = 0.0
+    offsets: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -35,7 +36,7 @@ class Choice:
             "others": [str(one) for one in self.others],
             "doubts": list(self.doubts),
             "scale": self.scale * self.recorded.scale,
-            "offset": self.offset,
+            "offset": dict(self.offsets) or self.offset,
         }
 
 

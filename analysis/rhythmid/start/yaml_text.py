@@ -200,7 +200,10 @@ def _channel(role: str, choice: Choice, roles: Roles, units: Units, bag: bool) -
         [f"topic: {one.topic}, field: {_quoted(one.field)}"] if bag else [f"column: {_quoted(one.column)}"]
     )
     parts.append(f"unit: {json.dumps(_unit(role, one, roles, units))}{_scale(one.scale * choice.scale)}")
-    if choice.offset:
+    if choice.offsets:
+        own = ", ".join(f"{json.dumps(name)}: {value:.10g}" for name, value in choice.offsets.items())
+        parts.append(f"offset: {{{own}}}")
+    elif choice.offset:
         parts.append(f"offset: {choice.offset:.10g}")
     if one.sign_bit is not None:
         parts.append(f"sign_bit: {one.sign_bit}")

@@ -80,7 +80,7 @@ class Inbox:
                     f"{source.place}{source.topic}: {found.topic.type} has no time stamp; use  time: receive  for this channel"
                 )
             kept = ~found.missing[source.field]
-            stamped[role] = times[kept], found.values[source.field][kept] * source.scale + source.offset
+            stamped[role] = times[kept], found.values[source.field][kept] * source.scale + source.one_offset
         first = [int(times[0]) for times, _ in stamped.values() if len(times)]
         if self.origin_ns is None and first:
             self.origin_ns = min(first)

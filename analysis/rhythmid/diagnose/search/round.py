@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.case import Untried
+from rhythmid.diagnose.constants import OWN_LINE
 from rhythmid.diagnose.free_functions import filtered
 from rhythmid.diagnose.search.score_tests import (
     Change,
@@ -23,6 +24,7 @@ from rhythmid.diagnose.search.score_tests import (
     trajectories,
     under,
 )
+from rhythmid.diagnose.shape import own_frequency
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
@@ -32,6 +34,7 @@ from rhythmid.identify.least_squares import column_norms, reduced
 from rhythmid.identify.multiple_shooting import periods_long, windows
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, coloured, minimise
+from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series
 
 Array = NDArray[np.float64]
@@ -129,8 +132,19 @@ def one_round(
         noise = NoiseModel(np.empty(0), noise.variance**0.5)
     give_back()
     fit = under(fit, noise, pool)
-    scores = score(fit, changes_at(fit, catalogue, pool))
-    return Round(tuple(scores), p_value(scores), added, tuple(scored_in_windows(fit, catalogue, pool))), fit
+    scores, local = score(fit, changes_at(fit, catalogue, pool)), scored_in_windows(fit, catalogue, pool)
+    scores, local = (_separable(some, fit) for some in (scores, local))
+    return Round(tuple(scores), p_value(scores), added, tuple(local)), fit
+
+
+def _separable(scores: Sequence[Score], fit: Fit) -> list[Score]:
+    """The scores without those of vibrations at the motion's own frequency.
+
+    Such a vibration stands for any change in the path of the force. It explains much of whatever is missing, but is never a cause that the
+    records show, and beside it the missing effect is hardly needed.
+    """
+    sizes = scales(fit.run.series, fit.model)
+    return [one for one in scores if own_frequency(one.element, one.values, sizes) >= OWN_LINE]
 
 
 def changes_at(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> Iterator[Change]:
