@@ -231,6 +231,13 @@ def test_a_constant_force_is_estimated_beside_the_dry_friction_that_prevails_in_
     assert remark.startswith("No dry friction: beside the constant part ")
 
 
+def test_of_a_motion_in_one_direction_friction_and_no_constant_force_is_needed(tmp_path):
+    """It rests without a drive, from where a constant force would drive it back."""
+    pushed = np.where((TIME > 2.0) & (TIME < 8.0), 9.0 + np.sin(5.0 * TIME), 0.0)
+    found = begun(tmp_path, pushed, moved(pushed, 0.5, 5.0, 0.0, 7.0)[0])
+    assert labels(found) == {"viscous_damper"}
+
+
 def test_no_spring_is_guessed_where_nothing_drives_a_machine_that_never_comes_back(tmp_path):
     speed = np.where(TIME < 1.0, 20.0 * TIME, 20.0 * np.exp(-0.4 * (TIME - 1.0)))
     np.savez(tmp_path / "run.npz", t=TIME, position=np.cumsum(speed) * foreign.STEP)

@@ -158,8 +158,7 @@ class Signals:
         for name, value in self.parameters.items():
             if isinstance(value, Mapping):
                 if record not in value:
-                    why = f"parameters: {name}: has no value for the record {record!r}"
-                    raise InputError(f"{self.path}: {why}")
+                    raise InputError(f"{self.path}: {name} has no value for the record {record!r}")
                 value = value[record]
             found[name] = value
         return found
@@ -382,8 +381,7 @@ def _source(
         node.fail("'topic:' is missing: whose field is it?")
     if given.column is None:
         node.fail("give topic and field (of a bag) or file and column (of a .mat, .csv or .npz table)")
-    file = default_file if given.file is None else folder / given.file
-    return replace(made, file=file, column=given.column)
+    return replace(made, file=folder / given.file if given.file else default_file, column=given.column)
 
 
 def _clock(node: Node, given: _Clock | Literal["header", "receive"], tables: bool) -> Clock:

@@ -161,8 +161,10 @@ def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: boo
             rows.fit([*moving, *more], delay, moving=True)
             for more in (["friction"], [*level, "friction"], level)
         )
-        law, kind = (options["constant"], "constant") if both.earns_place(against) else (against, "free")
-        if kind == "constant" and both.earns_place(steady):
+        # where the motion has one direction, the filter alone tells the two apart
+        needed = both.earns_place(against) and (rows.comes_back or steady.left < against.left)
+        law, kind = (options["constant"], "constant") if needed else (against, "free")
+        if needed and both.earns_place(steady):
             law = both  # alone, the constant would take on the friction of the direction that prevails
     back = [name for name in ("spring", "pendulum") if name in options]
     if back:
