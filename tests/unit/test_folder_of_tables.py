@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rhythmid.errors import InputError
+from rhythmid.record.folder_of_tables import size_of
 from rhythmid.record.inventory import inventory
 from rhythmid.record.load import load
 from rhythmid.start.start import start
@@ -74,3 +75,8 @@ def test_runs_of_one_layout_and_runs_at_different_times_are_refused(tmp_path):
     stream(tmp_path / "days", "motor", 100.0, {"current": np.sin}, began=BEGAN + 86400.0)
     with pytest.raises(InputError, match="not recorded at the same time"):
         inventory(tmp_path / "days")
+
+
+def test_check_tells_the_size_of_all_tables(tmp_path):
+    folder = arm(tmp_path / "log")
+    assert size_of(folder) == sum(one.stat().st_size for one in folder.iterdir())

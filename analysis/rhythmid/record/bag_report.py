@@ -15,6 +15,7 @@ from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block
 from rhythmid.record.cleaning import LeftOut, cleaned, peak_note, placeholder_notes
 from rhythmid.record.columns import Columns, read_columns
+from rhythmid.record.folder_of_tables import size_of
 from rhythmid.record.gaps import Cut, cut_at_gaps
 from rhythmid.record.joint_notes import notes_of_joints
 from rhythmid.record.joint_record import JointSignals, names_joints, read_joint_record
@@ -302,7 +303,7 @@ def _tables(source: Path, signals: Signals | JointSignals | None) -> tuple[int, 
     read = {(one.file or source, one.column) for part in given for one in part.channels.values()}
     files = {file for file, _ in read}
     read |= {(file, part.time.column) for part in given if part.time.kind == "column" for file in files}
-    return sum(file.stat().st_size for file in files), len(read)
+    return sum(map(size_of, files)), len(read)
 
 
 def _times(bag: Bag) -> tuple[dict[str, NDArray[np.int64]], dict[str, Columns]]:

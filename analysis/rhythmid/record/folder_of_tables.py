@@ -41,6 +41,11 @@ def is_folder_of_tables(path: Path) -> bool:
         return False
 
 
+def size_of(path: Path) -> int:
+    """Size [bytes] of a table, or of all tables of a folder."""
+    return sum(one.stat().st_size for one in (_tables_in(path) if path.is_dir() else [path]))
+
+
 def read_folder(
     path: Path, vectors: Callable[[Path], list[tuple[str, Array]]]
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
