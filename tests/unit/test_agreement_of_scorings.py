@@ -146,7 +146,7 @@ def test_effort_is_asked_where_a_free_run_leaves_open_what_is_missing(monkeypatc
     able = SimpleNamespace(
         applies=True,
         effort_share=0.5,
-        free_run_means_something=True,
+        free_run_is_informative=True,
         band_left_out=False,
         noisier=False,
         notes=(),

@@ -111,7 +111,7 @@ def test_stiffness_of_a_frame_on_a_moving_base_comes_out_of_its_acceleration(kin
 
 def test_the_effort_is_scored_where_it_makes_the_motion():
     found = applicable([axis()], axis_model())
-    assert found.applies and not found.free_run_means_something
+    assert found.applies and not found.free_run_is_informative
     assert "Hz" in found.reason and found.bandwidth > 1.0
     assert found.balance is not None
 
@@ -122,7 +122,7 @@ def test_a_machine_of_which_only_the_speed_is_known_runs_free_where_damping_hold
     speed = Channel(record.output.time, np.gradient(record.output.value, record.output.time), "m/s")
     model = axis_model().with_values({"viscous_damper.damping": damping})
     found = applicable([replace(record, output=speed, output_kind="velocity")], model)
-    assert found.recorded and found.free_run_means_something is held
+    assert found.recorded and found.free_run_is_informative is held
     assert (found.balance is None) is held  # the rows are needed at once only where no free run comes first
 
 

@@ -105,7 +105,7 @@ def test_windows_in_which_nothing_is_missing_tell_what_a_free_run_says(monkeypat
     fit = SimpleNamespace(fit=SimpleNamespace(model=hopper(), std={}))
     effort = SimpleNamespace(
         applies=False,
-        free_run_means_something=True,
+        free_run_is_informative=True,
         effort_share=0.0,
         notes=(),
         band_left_out=False,
@@ -275,7 +275,7 @@ def asked(
         return SimpleNamespace(search=SimpleNamespace(fit=SimpleNamespace(model=hopper(), std={})))
 
     effort = SimpleNamespace(
-        applies=True, free_run_means_something=means, effort_share=share, notes=(), band_left_out=band_left_out, noisier=noisier
+        applies=True, free_run_is_informative=means, effort_share=share, notes=(), band_left_out=band_left_out, noisier=noisier
     )  # fmt: skip
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
     monkeypatch.setattr(module, "_by_effort", by_effort)
@@ -326,7 +326,7 @@ def test_the_effort_is_scored_where_no_window_serves_although_those_come_first(m
 
     found = diagnosed("undecided", kind="effort")
     effort = SimpleNamespace(
-        applies=True, free_run_means_something=True, effort_share=0.5, notes=(), band_left_out=True, noisier=False
+        applies=True, free_run_is_informative=True, effort_share=0.5, notes=(), band_left_out=True, noisier=False
     )  # fmt: skip
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
     monkeypatch.setattr(module, "settle", lambda *given: fails() if given[-1] else iter([]))

@@ -14,7 +14,7 @@ UNSETTLED: tuple[Verdict, ...] = ("undecided", "unknown_physics")
 DOUBTED = "Believe neither without another experiment."
 
 
-def tells_all(found: Diagnosis, disturbed: bool) -> bool:
+def effort_suffices(found: Diagnosis, disturbed: bool) -> bool:
     """Whether effort scoring leaves nothing that the motion could tell: little effort, and nothing without a name.
 
     A free run that small errors of the effort disturb tells less than even a little effort: that of a quasi-static machine, whose

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.admission import Admitted, admitted
-from rhythmid.diagnose.agreement import HOW, UNSETTLED, contradictions, tells_all
+from rhythmid.diagnose.agreement import HOW, UNSETTLED, contradictions, effort_suffices
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
@@ -305,11 +305,11 @@ def _answers(
         return case.budget.spent
 
     disturbed = effort.noisier or effort.effort_share >= QUASI_STATIC
-    first = effort.applies and (disturbed or not (effort.free_run_means_something or effort.band_left_out))
+    first = effort.applies and (disturbed or not (effort.free_run_is_informative or effort.band_left_out))
     if first:
         answer = _by_effort(whole, effort, effort_notes)
         yield answer
-        if tells_all(answer.diagnosis, disturbed) or late(BY_MOTION):
+        if effort_suffices(answer.diagnosis, disturbed) or late(BY_MOTION):
             return
     series = prepare((*case.records, *case.holdout))
     by_motion = partial(_by_motion, case, series, given.notes, late)

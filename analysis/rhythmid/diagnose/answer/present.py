@@ -133,7 +133,7 @@ def findings(
             found, [p for r in records if (p := pumpings[id(r)])], result.calibration.series, nominal
         ),
         nominal=given_values(nominal),
-        refitted=_estimates(found.nominal),
+        refitted={name: asdict(estimated(found.nominal, name)) for name in found.nominal.model.parameters},
         refitted_delays=delays_of(found.nominal),
         records=qualities(records, holdout),
         words=words_of(elements),
@@ -234,11 +234,6 @@ def _transfer(
     unit = f"{nominal.units.position}/{nominal.units.force}"
     pumped = pumping.frequency if pumpings else None
     return TransferChange(frequency, tuple(map(int, indices)), before.value, after.value, unit, pumped)
-
-
-def _estimates(fit: Fit) -> dict[str, dict[str, float | str | None]]:
-    """Every parameter of a fit, as the answer states it."""
-    return {name: asdict(estimated(fit, name)) for name in fit.model.parameters}
 
 
 def _elements(found: Search, nominal: Model) -> list[Element]:

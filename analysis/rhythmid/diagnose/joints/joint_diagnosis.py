@@ -24,7 +24,7 @@ from rhythmid.diagnose.joints.gear_compliance import GearCompliance, likely_gear
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
-from rhythmid.diagnose.joints.link_cause import feels, likely_link
+from rhythmid.diagnose.joints.link_cause import LIGHTEST, feels, likely_link
 from rhythmid.diagnose.joints.link_exchange import exchanged
 from rhythmid.diagnose.joints.misfit import braking, late_efforts, misfits
 from rhythmid.diagnose.joints.stated_fit import stated_parameters
@@ -51,9 +51,6 @@ if TYPE_CHECKING:
 
 # masses, inertias and payloads of links that are corrected, at most, or the number of links if that is larger
 MOST_LINKS = 2
-# share of the given mass of a link, below which another effect has absorbed it. An inertia in a file may be that about the joint,
-# of which the inertia about the centre of mass may be any share
-LIGHTEST = 0.1
 # time of the correction of a link's value, in times that the balances of all joints take (measured: 20 for an arm of seven joints)
 CORRECTION = 20.0
 MATTERS = 0.02  # smallest change of a mass or an inertia that an effort balance resolves, as a share of it
@@ -386,7 +383,8 @@ def _differs(one: JointResult, label: str) -> bool:
 
 
 def _removed(kind: str, before: float, after: float) -> bool:
-    """Whether a value of a link has gone from what it is in the model."""
+    """Whether a value of a link has gone from what it is in the model. An inertia in a file may be that about the joint, of which
+    the inertia about the centre of mass may be any share."""
     return after <= 0.0 if kind == TURNING else after < LIGHTEST * before
 
 

@@ -30,18 +30,15 @@ def own_path(balances: JointBalances, one: JointResult) -> Model:
     return replace(with_body_of(nominal, one.result.chosen.fit.model), mass=nominal.mass)
 
 
-def with_body_of(nominal: Model, model: Model, kept: bool = False) -> Model:
-    """A path of a joint with the values of the body as its `nominal` path has them, or with its own `kept` and those that it lacks.
+def with_body_of(nominal: Model, model: Model) -> Model:
+    """A path of a joint with the values of the body as its `nominal` path has them.
 
     Its inertia is that which the balance has subtracted from what the body asks for; it stays free where it is.
     """
     inertia = replace(nominal.mass, fixed=model.mass.fixed)
-    given, own = nominal.term(BODY), model.term(BODY)
-    if given is None or own is None:
+    given = nominal.term(BODY)
+    if given is None:
         return replace(model, mass=inertia)
-    if kept:
-        known = {name: value for name, value in own.values.items() if name in given.values}
-        given = replace(given, values={**given.values, **known})
     terms = tuple(given if term.label == BODY else term for term in model.terms)
     return replace(model, mass=inertia, terms=terms)
 

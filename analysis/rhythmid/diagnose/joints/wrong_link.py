@@ -80,7 +80,8 @@ class WrongLink:
             self.told(machine.body),
         )
         if kind in (CENTRE, LOAD):
-            before = {MASS: own.mass, MOMENT: own.mass * distance_of(machine.body, link, own.centre)}
+            distance = float(np.linalg.norm(own.centre - origin_of(machine.body, link)))
+            before = {MASS: own.mass, MOMENT: own.mass * distance}
             said = [_change(old, told[name]) for name, old in before.items() if name in told]
             if "x" in told:
                 places = ", ".join(f"{one:.3g}" for one in own.centre)
@@ -100,11 +101,6 @@ class WrongLink:
 def _change(before: float, after: Estimate) -> str:
     """A value of the nominal model and that of the records, in words."""
     return f"{before:.4g} {after.unit} in the nominal model, {with_std(after.value, after.std)} {after.unit} in the records"
-
-
-def distance_of(body: MujocoBody, link: str, centre: Array) -> float:
-    """Distance [m] of a centre (3,) from the hinge of its link, or from the origin of its frame."""
-    return float(np.linalg.norm(centre - origin_of(body, link)))
 
 
 def origin_of(body: MujocoBody, link: str) -> Array:

@@ -64,7 +64,7 @@ class Applicability:
     noisier: bool = False
 
     @property
-    def free_run_means_something(self) -> bool:
+    def free_run_is_informative(self) -> bool:
         """Whether a long free run of the model does not accumulate every small disturbance."""
         return self.restoring and not self.closed
 
