@@ -1,5 +1,7 @@
 """Text tables whose first rows have empty cells, or words for a number that is missing, as where channels start one after the other."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -56,8 +58,8 @@ def test_missing_cells_are_missing_measurements(tmp_path):
     assert len(record.output) == COUNT - 3 and record.quality.channels["output"].nan == 3
 
 
-def test_a_time_that_is_missing_in_a_row_is_refused_with_the_row(tmp_path):
+def test_times_that_are_missing_in_more_than_a_few_rows_are_refused_with_the_row(tmp_path):
     path = written(tmp_path / "run.csv", 1, "")
-    path.write_text(path.read_text().replace("\n0.000000,", "\n,").replace("\n0.010000,", "\n,"))
+    path.write_text(re.sub(r"\n0\.0[0-9]0000,", "\n,", path.read_text()))
     with pytest.raises(InputError, match="time is missing in row 2"):
         inventory(path)
