@@ -15,6 +15,7 @@ import rhythmid
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
 from rhythmid.offline_run import simulate
+from rhythmid.proof.rate import Rate
 from rhythmid.record.signals import Signals
 
 ROOT = Path(__file__).parents[2]
@@ -135,45 +136,55 @@ def test_the_citation_is_of_this_version():
 
 def test_the_figures_of_the_summary_are_those_of_the_pages_that_it_sums_up():
     summary = (DOCS / "validation.md").read_text(encoding="utf-8")
-    concealed = summary.partition("## Concealed effects, in numbers")[2].partition("## Real")[0]
-    proof = (DOCS / "proof.md").read_text(encoding="utf-8")
-    for cases, measured in re.findall(r"\| (\d+) \| ([^|]+) \|$", concealed, re.MULTILINE):
-        assert re.search(rf"\| {cases} \| {re.escape(measured)}", proof), measured
     real = (DOCS / "real.md").read_text(encoding="utf-8")
     for before, after in re.findall(r"([\d.]+) → ([\d.]+) %", summary):
         assert f"| {before} → {after} |" in real, before
 
 
-def counted(page: str, row: str) -> tuple[int, int]:
-    """How many, of how many cases, in the row of a table that begins so."""
-    found = re.search(rf"^\| {re.escape(row)} \|.*?\| (\d+) \| (\d+)\b", page, re.MULTILINE)
-    assert found is not None, row
-    return int(found[2]), int(found[1])
+ROW = re.compile(
+    r"^\| ([^|]+) \| ([^|]+) \| [^|]* \| (\d+) of (\d+) \| (\d+) of (\d+) \| (\d+) of (\d+) = ([\d.]+) % \(([\d.]+)–([\d.]+)\) \|$",
+    re.MULTILINE,
+)
+
+
+def test_the_campaigns_of_all_versions_add_up_and_have_wilsons_intervals():
+    rows = ROW.findall((DOCS / "proof.md").read_text(encoding="utf-8"))
+    assert len(rows) > 10
+    for kind, quantity, *counts in rows:
+        earlier, of_earlier, now, of_now, every, of_every = map(int, counts[:6])
+        assert (earlier + now, of_earlier + of_now) == (every, of_every), (kind, quantity)
+        stated = [float(one) for one in counts[6:]]
+        expected = [100.0 * one for one in (every / of_every, *Rate(every, of_every).interval)]
+        assert stated == pytest.approx(expected, abs=0.051), (kind, quantity)
+
+
+def counted(page: str, kind: str, quantity: str) -> tuple[int, int]:
+    """How many, of how many cases, all versions together."""
+    found = [row for row in ROW.findall(page) if row[0] == kind and row[1].startswith(quantity)]
+    assert len(found) == 1, (kind, quantity)
+    return int(found[0][6]), int(found[0][7])
 
 
 def test_the_rates_on_the_first_page_and_in_the_texts_are_those_of_the_campaigns():
     proof = (DOCS / "proof.md").read_text(encoding="utf-8")
-    first, of_first = counted(proof, "single, cluttered: dominant effect first")
-    wrong, of_wrong = counted(proof, "single, cluttered: stated with p ≥ 0.8 and wrong")
-    clean, of_clean = counted(proof, "null, clean: something named")
-    untidy, of_untidy = counted(proof, "null, cluttered: something named")
-    relative, of_relative = counted(proof, "left out, cluttered: stated with p ≥ 0.8 and wrong")
+    first, cases = counted(proof, "One effect, cluttered", "concealed effect first")
+    wrong, _ = counted(proof, "One effect, cluttered", "a wrong name")
+    clean, of_clean = counted(proof, "Nothing missing, clean", "something named")
+    untidy, of_untidy = counted(proof, "Nothing missing, cluttered", "something named")
+    relative, of_relative = counted(proof, "Law not in the catalogue, cluttered", "a wrong name")
     summary = (DOCS / "validation.md").read_text(encoding="utf-8")
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert of_wrong == of_first and wrong == clean == 0  # the texts below say "none"
-    assert (
-        f"first in {first} of {of_first} cases" in readme
-        and f"first in {first} of {of_first} cases" in summary
-    )
-    assert f"nothing named in {of_clean} clean cases; in {untidy} of {of_untidy} untidy ones" in readme
-    assert f"in 0 of {of_clean} clean cases" in summary
-    assert f"untidy logs and small effects in {untidy} of {of_untidy}" in summary
     package = (ROOT / "analysis" / "README.md").read_text(encoding="utf-8")
-    assert (
-        f"first in {first} of {of_first} cases" in package and f"named in {of_clean} clean cases." in package
-    )
-    for page in (readme, summary, package, (DOCS / "missing_physics.md").read_text(encoding="utf-8")):
-        assert f"{relative} of {of_relative}" in page
+    for page in (readme, summary, package):
+        assert f"first in {first} of {cases} cases" in page
+        assert f"in {clean} of {of_clean} clean cases" in page
+    assert f"of 0.8 or more in {wrong} of {cases}" in readme
+    assert f"a wrong name in {wrong} of {cases}" in summary
+    assert f"in {untidy} of {of_untidy} untidy ones" in readme and f"in {untidy} of {of_untidy}" in summary
+    missing = (DOCS / "missing_physics.md").read_text(encoding="utf-8")
+    evidence = (DOCS / "evidence.md").read_text(encoding="utf-8")
+    for page in (readme, summary, package, missing, evidence):
+        assert re.search(rf"\b{relative} of\s{of_relative}\b", page)
 
 
 def test_the_real_recordings_on_the_first_page_are_those_of_the_summary():
