@@ -1,12 +1,11 @@
-"""Start values from the likelihood in the frequency domain: parameters and delays together, from harmonic transfer
-functions and limit cycle.
+"""Maximum likelihood in the frequency domain: parameters and delays together, from harmonic transfer functions and
+limit cycle.
 
 Minimises Σ_l |Y_l − Σ_m G_m(θ) e^{−j[(ω_l − mω_p) τ_u + ω_l τ_y]} U_{l−mP}|² / σ_l² + Σ_n |X̂_n − X_n(θ) e^{−jnω_p τ_y}|² / σ_n²
 over the free parameters θ and the delays (R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach,
 2nd ed., 2012, chapter 9; for time-periodic systems E. Louarroudi et al., IEEE TIM 61(5), 2012). The machine is linearised
-around its limit cycle, so distortion biases the result slightly; the time-domain fit of `joint`, which starts from it, has no
-such bias. This form converges from values that are far off. A search needs no variance of single lines: the response has the
-same one at all lines, and the limit cycle one that does not outweigh it.
+around its limit cycle, so distortion biases it slightly; the time-domain fit of `joint` has no such bias. This form
+converges from starting values that are far off. It is also an independent check.
 """
 
 import math
@@ -31,11 +30,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 DELAYS = (INPUT_DELAY, MEASUREMENT_DELAY)
 CYCLE = 4  # number of harmonics of the limit cycle that are used
-LINES = 1500  # number of spectral lines used
-RING_DOWN = 2.0  # [s] of the machine, for the warm-up of spectra
-RESPONSE_VARIANCE = 3e-4  # of every line, as a share of the power of the response
-CYCLE_ERROR = 0.03  # standard deviation of each harmonic of the limit cycle, as a share of the first one
-DESCENDED = 1e-4  # relative change at which a descent ends: the fit in the time domain goes on from there
+PARTS = 8  # parts of the record, whose spread gives the disturbance of the limit cycle
+LINES = 1500  # number of spectral lines used in a search
 LONGEST_DELAY = 0.5  # [s] largest delay searched on either side
 SIDEBANDS = 3  # number on either side that are compared
 TIME = 0.02  # [s] scale of a delay that starts at zero
@@ -45,23 +41,33 @@ FACTORS = np.geomspace(0.4, 2.5, 25)  # grid for each parameter when a search st
 
 @dataclass(frozen=True, eq=False)
 class HarmonicFit:
-    """Parameters `names` (the delays last) with `values`. `misfit` is the unexplained share (rms) of the response to the command."""
+    """Parameters `names` (the delays last) with `values` and `covariance`. `misfit` is the unexplained share (rms)
+    of the response to the command, `expected` complex128[n] the predicted response at the `bins`."""
 
+    model: Model
     names: tuple[str, ...]
     values: Array
+    covariance: Array
     misfit: float
+    bins: NDArray[np.int64]
+    expected: Complex
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Standard deviation of each estimate, by the Cramér-Rao bound."""
+        return {n: float(math.sqrt(max(v, 0.0))) for n, v in zip(self.names, np.diag(self.covariance))}
 
 
 class _Comparison:
     """Spectra of a record beside those of a model."""
 
-    def __init__(self, record: Record, model: Model, pumping: Pumping) -> None:
+    def __init__(self, record: Record, model: Model, pumping: Pumping, cycle: bool, ring_down: float) -> None:
         self.model, self.pumping = model, pumping
         self.kind: InputKind = record.input_kind
-        self.cycle = pumping.active
+        self.cycle = cycle and pumping.active
         self.names = [n for n in model.free if n not in DELAYS]
         self.m = np.arange(-SIDEBANDS, SIDEBANDS + 1) if pumping.active else np.zeros(1, dtype=np.int64)
-        self.spectra: Spectra = spectra(record, pumping, RING_DOWN, SIDEBANDS + 1)
+        self.spectra: Spectra = spectra(record, pumping, ring_down, SIDEBANDS + 1)
         self._guess: Array | None = None
         self._last: tuple[Array, LinearisedModel] | None = None
         highest = (self.spectra.band[1] + SIDEBANDS * pumping.frequency) / self.spectra.resolution
@@ -69,19 +75,27 @@ class _Comparison:
         if pumping.active:
             bins = bins[bins % self.spectra.window.periods != 0]
         self.bins = bins
-        power = float(np.mean(np.abs(self.spectra.output[bins]) ** 2))
-        self._thin()
-        self.variance = RESPONSE_VARIANCE * power * len(self.bins)
-        # its small harmonics have no weight: the limit cycle must not outweigh the response far from the optimum
-        size = float(np.abs(self.spectra.cycle[1])) if len(self.spectra.cycle) > 1 else 1.0
-        self.cycle_variance = (CYCLE_ERROR * size) ** 2 + 1e-30
+        self.variance = np.full(len(bins), float(np.mean(np.abs(self.spectra.output[bins]) ** 2)))
+        self.cycle_variance = self._disturbance()
 
-    def _thin(self) -> None:
-        """Keep at most `LINES` spectral lines, those with the largest response."""
+    def _disturbance(self) -> Array:
+        """Variance of each harmonic of the measured cycle (CYCLE + 1,): line noise of the neighbouring bins."""
+        p = self.spectra.window.periods
+        length = p * self.pumping.period
+        found = np.full(CYCLE + 1, np.inf)
+        for n in range(min(CYCLE + 1, len(self.spectra.cycle))):
+            near = np.abs(np.arange(n * p - p // PARTS, n * p + p // PARTS + 1))
+            near = near[(near % p != 0) & (near < len(self.spectra.output))]
+            if len(near):
+                found[n] = float(np.mean(np.abs(self.spectra.output[near]) ** 2)) / length**2
+        return np.maximum(found, 1e-24)
+
+    def thinned(self, lines: int) -> None:
+        """Keep at most `lines` spectral lines, those with the largest response."""
         power = np.abs(self.spectra.output[self.bins]) ** 2
         strong = np.flatnonzero(power > 1e-4 * power.max())
-        keep = np.sort(strong[:: max(1, -(-len(strong) // LINES))])
-        self.bins = self.bins[keep]
+        keep = np.sort(strong[:: max(1, -(-len(strong) // lines))])
+        self.bins, self.variance = self.bins[keep], self.variance[keep]
 
     def linearised(self, values: Array) -> LinearisedModel:
         if self._last is not None and np.array_equal(values, self._last[0]):  # only the delays differ
@@ -120,7 +134,7 @@ class _Comparison:
             shown = model.cycle.harmonics(CYCLE) * np.exp(-1j * self.pumping.omega * n * measurement_delay)
             gap: Complex = np.zeros(CYCLE + 1, dtype=np.complex128)
             seen = min(CYCLE + 1, len(self.spectra.cycle))
-            gap[:seen] = (shown[:seen] - self.spectra.cycle[:seen]) / np.sqrt(self.cycle_variance)
+            gap[:seen] = (shown[:seen] - self.spectra.cycle[:seen]) / np.sqrt(self.cycle_variance[:seen])
             parts += [np.real(gap)[:1], np.sqrt(2.0) * np.real(gap)[1:], np.sqrt(2.0) * np.imag(gap)[1:]]
         return np.concatenate(parts)
 
@@ -193,7 +207,7 @@ def _scan(comparison: _Comparison, start: Array) -> tuple[Array, Array, float]:
     return values, delays, best
 
 
-def _descend(comparison: _Comparison, start: Array) -> Array:
+def _descend(comparison: _Comparison, start: Array, tolerance: float = 1e-8) -> Array:
     bounds = [comparison.model.parameters[name].bounds for name in comparison.names]
     low = np.array([b[0] for b in bounds] + [-0.05, -0.05])
     high = np.array([b[1] for b in bounds] + [LONGEST_DELAY + 0.1, LONGEST_DELAY + 0.1])
@@ -207,32 +221,79 @@ def _descend(comparison: _Comparison, start: Array) -> Array:
         bounds=(low, high),
         x_scale=scale,
         diff_step=1e-5,
-        xtol=DESCENDED,
-        ftol=DESCENDED,
+        xtol=tolerance,
+        ftol=tolerance,
         max_nfev=25,
     )
     return found.x
 
 
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
-def harmonic_likelihood(record: Record, model: Model, pumping: Pumping) -> HarmonicFit:
-    """Start values of the model's free parameters and both delays from one record, also from values that are far off.
+def harmonic_likelihood(
+    record: Record, model: Model, pumping: Pumping, cycle: bool = True, search: bool = False
+) -> HarmonicFit:
+    """Estimate the model's free parameters and both delays from one record, also from starting values that are far off.
 
-    `model` has no forcing of its own: `pumping` describes it. Raises InputError when the record has no input or the
-    model no limit cycle.
+    `model` has no forcing of its own: `pumping` describes it. With `cycle` False the limit cycle is not used as
+    data. With `search` True only a start for another fit is computed, from few spectral lines in one pass. Raises
+    InputError when the record has no input or the model no limit cycle.
     """
     if record.input is None:
         raise InputError(f"{record.name}: has no input, so there is no transfer function to fit")
     plain = model.with_values({name: 0.0 for name in DELAYS if name in model.parameters})
-    comparison = _Comparison(record, plain, pumping)
+    ring_down = 2.0
+    comparison = _Comparison(record, plain, pumping, cycle, ring_down)
+    if search:
+        comparison.thinned(LINES)
+    # while the search is far off, the limit cycle must not outweigh the response; its small harmonics have no weight yet
+    exact, response = comparison.cycle_variance, comparison.variance
+    size = float(np.abs(comparison.spectra.cycle[1])) if len(comparison.spectra.cycle) > 1 else 1.0
+    comparison.cycle_variance = np.full(CYCLE + 1, (0.03 * size) ** 2 + 1e-30)
+    comparison.variance = np.full(len(response), 3e-4 * float(np.sum(response)))
     start = np.array([plain.value(name) for name in comparison.names])
     own, delays, _ = _scan(comparison, start)
-    values = _descend(comparison, np.concatenate([own, delays]))
+    values = _descend(comparison, np.concatenate([own, delays]), 1e-4 if search else 1e-8)
+    for _ in range(0 if search else 2):
+        comparison.cycle_variance = exact
+        left = np.abs(_left(comparison, values)) ** 2
+        wide = max(9, len(left) // 60)
+        local = np.convolve(left, np.ones(wide) / wide, mode="same")
+        comparison.variance = np.maximum(local, 1e-16 * float(np.mean(response)))
+        values = _descend(comparison, values)
+    left = _left(comparison, values)
     measured = comparison.spectra.output[comparison.bins]
+    names = (*comparison.names, *DELAYS)
+    return HarmonicFit(
+        model.with_values({n: v for n, v in zip(names, values) if n in model.parameters}),
+        names,
+        values,
+        _covariance(comparison, values),
+        float(np.sqrt(np.sum(np.abs(left) ** 2) / np.sum(np.abs(measured) ** 2))),
+        comparison.bins,
+        measured + left,
+    )
+
+
+def _left(comparison: _Comparison, values: Array) -> Complex:
+    """Predicted minus measured response at the bins."""
     parts = comparison.sidebands(comparison.linearised(values[:-2]))
-    left = comparison.expected(parts, values[-2], values[-1]) - measured
-    misfit = float(np.sqrt(np.sum(np.abs(left) ** 2) / np.sum(np.abs(measured) ** 2)))
-    return HarmonicFit((*comparison.names, *DELAYS), values, misfit)
+    return comparison.expected(parts, values[-2], values[-1]) - comparison.spectra.output[comparison.bins]
+
+
+def _covariance(comparison: _Comparison, values: Array) -> Array:
+    """Inverse of the Fisher information F = 2 Re Σ_l (∂Ŷ_l)ᴴ (∂Ŷ_l) / σ_l² + limit cycle."""
+    base = comparison.residual(values)
+    columns = []
+    for i, value in enumerate(values):
+        step = 1e-5 * (abs(value) or 1.0) if i < len(values) - 2 else 1e-6
+        moved = values.copy()
+        moved[i] += step
+        columns.append((comparison.residual(moved) - base) / step)
+    jacobian = np.column_stack(columns)
+    norms = np.linalg.norm(jacobian, axis=0)
+    norms[norms == 0.0] = 1e-150
+    scaled = jacobian / norms
+    return np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True) / np.outer(norms, norms)
 
 
 def visible_sidebands(
@@ -243,7 +304,7 @@ def visible_sidebands(
     harmonics: Sequence[int] = (1, 2, 3, 4),
 ) -> list[int]:
     """Harmonics |m| that exceed noise of `noise_density` [unit²/Hz], two-sided: Σ|G_m U|²/σ² > 25."""
-    found = spectra(record, pumping, RING_DOWN, max(harmonics) + 1)
+    found = spectra(record, pumping, 2.0, max(harmonics) + 1)
     bins = np.arange(1, len(found.output))
     m = np.array([sign * h for h in harmonics for sign in (-1, 1)])
     frequency: Array = bins.astype(np.float64) * found.resolution

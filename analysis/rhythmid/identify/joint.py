@@ -192,7 +192,7 @@ def _start(model: Model, records: Sequence[Record], pumping: Pumping | None) -> 
             continue
         try:
             own = (pumping_of(record) or pumping) if pumping is not None else NO_PUMPING
-            fit = harmonic_likelihood(record, own_model(plain, record), own or NO_PUMPING)
+            fit = harmonic_likelihood(record, own_model(plain, record), own or NO_PUMPING, search=True)
         except InputError:
             continue
         values = {name: v for name, v in zip(fit.names, fit.values) if name in model.free}
