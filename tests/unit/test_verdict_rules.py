@@ -28,10 +28,6 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
         "lost": replace(
             contest(supposed("", predicted(SIZE**2)), friction((0.8 * SIZE) ** 2)), structured_after=0.9
         ),
-        "astray_of_all": replace(
-            contest(supposed("", predicted((1.5 * SIZE) ** 2)), friction((1.4 * SIZE) ** 2)),
-            structured_after=0.99,
-        ),
         "few_blocks": contest(
             supposed("", predicted(1.0, 0.0, mood=0.0)), supposed("friction", predicted(0.5, 4.2, mood=0.18))
         ),
@@ -61,3 +57,15 @@ def test_every_verdict_has_a_row_and_names_of_rows_are_their_own():
     names = [rule.name for rule in VERDICT_RULES]
     assert len(set(names)) == len(names)
     assert {rule.verdict for rule in VERDICT_RULES} == set(get_args(Verdict))
+
+
+def test_an_error_of_many_times_what_was_measured_is_told_without_its_figure():
+    lost = replace(
+        contest(supposed("", predicted((40.0 * SIZE) ** 2)), friction((39.0 * SIZE) ** 2)),
+        structured_after=0.99,
+    )
+    decision = decided(lost)[1]
+    assert decision.rule == "lost"
+    assert (
+        "misses more than 100 % of what was measured; more than 100 points of this error" in decision.reason
+    )

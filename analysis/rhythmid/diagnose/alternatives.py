@@ -109,7 +109,7 @@ def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Tri
     """The base model with elements related to that of `term` in its place: of its family, or declared to be confusable with it.
 
     Only elements that scored in some round, that are no hypothesis yet and that need nothing that the base model lacks are
-    proposed. The first guesses include the fitted values of the other members of the family, and those of the element alone:
+    proposed. The first guesses include the fitted values of the other related elements, and those of the element alone:
     it may need other values of the model's own parameters. A spring, for example, contains a pendulum's gravity.
     """
     scored: dict[str, list[Score]] = {}

@@ -89,11 +89,19 @@ class VerdictRule:
         return self.reason.format(
             goes_with=found.goes_with,
             left=100.0 * found.left,
-            missed=100.0 * found.missed,
+            missed=_per_cent(found.missed),
             structured=100.0 * found.structured,
-            lost=100.0 * found.lost,
+            lost=_per_cent(found.lost),
             detectable=100.0 * found.detectable,
         )
+
+
+def _per_cent(share: float) -> str:
+    """A share in per cent; an error may be many times what was measured, and how many times says nothing."""
+    value = 100.0 * share
+    if value > 100.0:
+        return "more than 100"
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
 
 
 def _alone(statistic: Callable[[Outcome], float]) -> Callable[[Outcome], float]:
@@ -112,20 +120,11 @@ def _of_search(statistic: Callable[[Outcome], float], cut_short: bool) -> Callab
 
 VERDICT_RULES: tuple[VerdictRule, ...] = (
     VerdictRule(
-        "astray_of_all",
-        "the autocorrelated part of the error of the chosen hypothesis, as a share of what was measured: beyond 1 a constant would predict better",
-        1.0,
-        "undecided",
-        "with every effect that was tried the model is farther from the records than their mean is: something that was not recorded may act, or units, "
-        "signs or the structure of the model are wrong",
-        lambda found: found.lost,
-    ),
-    VerdictRule(
         "lost",
         "the autocorrelated part of the error of the chosen hypothesis, as a share of what was measured",
         MAINLY,
         "undecided",
-        "with every effect that was tried the model misses {missed:.0f} % of what was measured; {lost:.0f} points of this error are autocorrelated, hence not "
+        "with every effect that was tried the model misses {missed} % of what was measured; {lost} points of this error are autocorrelated, hence not "
         "noise: something that was not recorded may act, or units, signs or the structure of the model are wrong",
         lambda found: found.lost,
     ),
@@ -161,7 +160,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "no effect is accepted: error of the refitted nominal model, as a share of what was measured",
         BLIND,
         "undecided",
-        "the refitted nominal model misses {missed:.0f} % of what was measured, and nothing that was tried explains it",
+        "the refitted nominal model misses {missed} % of what was measured, and nothing that was tried explains it",
         _alone(lambda found: found.missed),
     ),
     VerdictRule(
@@ -169,7 +168,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "no effect is accepted: the autocorrelated part of the error of the refitted nominal model, as a share of what was measured",
         LEFT,
         "undecided",
-        "the refitted nominal model misses {missed:.0f} % of what was measured; {structured:.0f} points of this error are autocorrelated, hence not noise, "
+        "the refitted nominal model misses {missed} % of what was measured; {structured:.0f} points of this error are autocorrelated, hence not noise, "
         "and no effect that was tried explains it",
         _alone(lambda found: found.structured),
     ),
@@ -187,7 +186,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "`unnamed_remainder`)",
         1.0,
         "undecided",
-        "the refitted nominal model misses {missed:.2g} % of what was measured; an effect that would remove a good part of it is not established, because "
+        "the refitted nominal model misses {missed} % of what was measured; an effect that would remove a good part of it is not established, because "
         "its gain rests on too few blocks of the records",
         _alone(lambda found: found.withheld),
     ),
