@@ -80,14 +80,14 @@ class Table:
             ".mat": _mat, ".npz": _npz, ".npy": _npy, ".parquet": _parquet, **dict.fromkeys(HDF5, read_hdf5), **dict.fromkeys(JSON, read_json),
             **dict.fromkeys(TEXT, text_table), **dict.fromkeys(EXCEL, read_excel),
         }  # fmt: skip
-        read = readers.get(table_suffix(path), text_table if is_folder_of_tables(path) else None)
-        if read is None:
+        folder, read = is_folder_of_tables(path), readers.get(table_suffix(path))
+        if read is None and not folder:
             refuse_foreign(path)
             raise InputError(
                 f"{path}: is not a table; .mat, {', '.join(HDF5)}, .npz, .npy, .parquet, {', '.join((*EXCEL, *JSON, *TEXT))} can be read"
             )
         try:
-            if is_folder_of_tables(path):
+            if read is None or folder:
                 found = read_folder(path, lambda file: list(cls.load(file).vectors()))
             else:
                 check_content(path)

@@ -356,17 +356,16 @@ def _alone(records: Sequence[Record], units: Units, catalogue: Catalogue, why: s
     model = _bare(units, 1.0, fixed=True)
     reasons = {INERTIA: f"{why}, so all is per unit of inertia"}
 
-    def balance(some: Sequence[Record]) -> tuple[Law, str]:
+    def balance(some: Sequence[Record]) -> tuple[Rows, Law, str]:
         rows = Rows.of([_as_driven(one) for one in some], model)
-        return restoring(some, rows, units.position == "rad", inertial=False)
+        return rows, *restoring(some, rows, units.position == "rad", inertial=False)
 
     try:
-        rows = Rows.of([_as_driven(one) for one in records], model)
-        law, kind = balance(records)
+        rows, law, kind = balance(records)
     except InputError as error:
         return _by_size(records, units, catalogue, str(error), fixed=True)
     made, more = _forces(model, law, kind, rows, catalogue)
-    zeros = own_zeros_of(records, balance)
+    zeros = own_zeros_of(records, law, lambda some: balance(some)[1:])
     return Nominal(made, reasons | more, tuple(_friction(law, units)), corrections=zeros)
 
 

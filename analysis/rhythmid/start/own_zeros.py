@@ -14,11 +14,11 @@ from rhythmid.start.correction import Correction
 
 
 def own_zeros_of(
-    records: Sequence[Record], balance: Callable[[Sequence[Record]], tuple[Law, str]]
+    records: Sequence[Record], law: Law, balance: Callable[[Sequence[Record]], tuple[Law, str]]
 ) -> tuple[Correction, ...]:
     """Offsets with which all records rest where the first does, as one correction; none where they have one zero.
 
-    `balance` gives the balance of some of the records and the kind of its restoring force. The offsets follow from where
+    `law` is the balance of all records; `balance` gives that of some of them and the kind of its restoring force. The offsets follow from where
     each record comes to rest alone, and are needed if the balance of all is clearly better with them.
     """
     if len(records) < 2 or any(one.output_kind != "position" for one in records):
@@ -39,7 +39,7 @@ def own_zeros_of(
         replace(one, output=replace(one.output, value=one.output.value + offsets[one.name]))
         for one in records
     ]
-    if not balance(moved)[0].earns_place(balance(records)[0]):
+    if not balance(moved)[0].earns_place(law):
         return ()
     unit = records[0].output.unit
     told = ", ".join(f"{name} by {-offset:.3g} {unit}" for name, offset in offsets.items() if offset)
