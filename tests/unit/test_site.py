@@ -181,6 +181,17 @@ def test_the_rates_on_the_first_page_and_in_the_texts_are_those_of_the_campaigns
     assert f"of 0.8 or more in {wrong} of {cases}" in readme
     assert f"a wrong name in {wrong} of {cases}" in summary
     assert f"in {untidy} of {of_untidy} untidy ones" in readme and f"in {untidy} of {of_untidy}" in summary
+    for kind, quantity in (
+        ("One effect, cluttered", "95 % intervals of the effect"),
+        ("One effect, cluttered", "95 % intervals of machine"),
+        ("Nothing missing, clean", "95 % intervals of machine"),
+        ("Nothing missing, cluttered", "95 % intervals of machine"),
+        ("Two effects, cluttered", "both exact"),
+        ("Two effects, cluttered", "95 % intervals"),
+        ("Law not in the catalogue, cluttered", "a wrong name"),
+    ):
+        held, of_held = counted(proof, kind, quantity)
+        assert f"in {held} of {of_held}" in summary, (kind, quantity)
     missing = (DOCS / "missing_physics.md").read_text(encoding="utf-8")
     evidence = (DOCS / "evidence.md").read_text(encoding="utf-8")
     for page in (readme, summary, package, missing, evidence):
