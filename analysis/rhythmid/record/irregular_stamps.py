@@ -34,9 +34,10 @@ def irregular(step: Array, period: float, long: Array) -> bool:
     return away > float(np.clip(FARTHER * scatter, NEAR, FAR))
 
 
-def too_short(step: Array, period: float) -> bool:
-    """Whether steps (n,) [s] are on average shorter than their apparent period; a gap counts as one lost sample."""
-    return float(np.mean(np.minimum(step, 2.0 * period))) < SHORTER * period
+def too_short(step: Array, period: float, gaps: float) -> bool:
+    """Whether steps (n,) [s] are on average shorter than their apparent period, without the `gaps` [s] by which all
+    steps together exceed that of one lost sample. Late samples that arrive in a burst do not shorten the mean."""
+    return float(np.sum(step)) - gaps < SHORTER * period * len(step)
 
 
 def usual_range(step: Array) -> tuple[float, float]:

@@ -173,21 +173,25 @@ def nominal_period(step: Times) -> float:
 def _sampling(step: Times) -> tuple[float, float | None]:
     """Nominal period [s] of steps (n,); and for irregular stamps the step [s] above which one is a pause, else None."""
     period, bursts = _usual_step(step)
-    if bursts or not (too_short(step, period) or irregular(step, period, _long_steps(step, period))):
+    if bursts:
+        return period, None
+    wide, each = _long_steps(step, period)
+    gaps = each * float(np.sum(np.maximum(wide - 2.0 * period, 0.0)))
+    common = each * len(wide) > COMMON * len(step)
+    if not (too_short(step, period, gaps) or (common and irregular(step, period, wide))):
         return period, None
     pause = PAUSE * usual_range(step)[1]
     return round(float(np.mean(step[step <= pause])) * 1e9) * 1e-9, pause
 
 
-def _long_steps(step: Times, period: float) -> Times:
-    """Steps (g,) that would be gaps of a periodic channel, limited to a sufficient number; empty where they are rare."""
+def _long_steps(step: Times, period: float) -> tuple[Times, int]:
+    """Steps (g,) that would be gaps of a periodic channel, limited to a sufficient number, and how many each stands for."""
     wide = np.flatnonzero(step > GAP * period)
-    if len(wide) <= COMMON * len(step):
-        return np.empty(0)
-    chosen = wide[:: math.ceil(len(wide) / JUDGED)]
+    each = max(1, math.ceil(len(wide) / JUDGED))
+    chosen = wide[::each]
     lost = np.maximum(np.rint(step[chosen] / period - 1.0).astype(np.int64), 1)
     real = _not_made_up_for(np.concatenate([[0.0], np.cumsum(step)]), period, chosen, lost)
-    return step[chosen[real]] if real.mean() * len(wide) > COMMON * len(step) else np.empty(0)
+    return step[chosen[real]], each
 
 
 def _usual_step(step: Times) -> tuple[float, bool]:
