@@ -6,7 +6,7 @@
     python benchmarks/foreign_robot.py campaign --effect nothing --runs 20       # how often the verdict is right
 
 The robot is tests/robots/mujoco_lift.py; its parameters can be concealed. The campaign prints each verdict, and
-whether the true values are within the 95 % intervals. The true delay is the time from the recording of a command to
+whether the true values are within the 95 % intervals. The true delay is the time from the sending of a command to
 its action, as reported by the robot.
 """
 
@@ -147,12 +147,11 @@ def signals(command_type: str) -> Signals:
 
 
 def true_delay(bag: Path, acted: np.ndarray) -> float:
-    """Mean time [s] from when a command was recorded to when it acted."""
-    recorded = np.concatenate(
-        [block.log_ns for block in Bag(bag).blocks(lambda topic: topic.name == "/lift/commands")]
-    )
-    count = min(len(recorded), len(acted))
-    return float(np.mean(acted[:count] - recorded[:count])) * 1e-9
+    """Mean time [s] from when a command was sent to when it acted."""
+    blocks = Bag(bag).blocks(lambda topic: topic.name == "/lift/commands")
+    sent = np.concatenate([block.sent_ns for block in blocks if block.sent_ns is not None])
+    count = min(len(sent), len(acted))
+    return float(np.mean(acted[:count] - sent[:count])) * 1e-9
 
 
 def judge(effect: Effect, found: Mapping[str, Any], delay: float, sigmas: float) -> list[str]:

@@ -15,6 +15,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from rhythmid.errors import InputError
+from rhythmid.record.bag import Bag
 from rhythmid.record.recover import recover
 from rhythmid_nodes.bag import LiveBag, Storage
 from rhythmid_nodes.qos import latched
@@ -49,6 +50,7 @@ def read(bag):
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_messages_of_any_type_and_quality_of_service_are_recorded(graph, tmp_path, storage):
     bag = tmp_path / "bag"
+    began_ns = time.time_ns()
     topics = ["joint_states", "force", "run"]
     recorder = graph.add(Recorder, path=str(bag), storage=storage, topics=topics)
     latch = graph.probe.create_publisher(String, "run", latched())
@@ -70,6 +72,10 @@ def test_messages_of_any_type_and_quality_of_service_are_recorded(graph, tmp_pat
     assert [m.position[0] for m in content["/hopper/joint_states"]] == [k * 1e-3 for k in range(100)]
     assert len(content["/hopper/force"]) == 100
     assert content["/hopper/run"][0].data == "said before anybody listened"
+    if storage == "mcap":
+        blocks = [block for block in Bag(bag).blocks() if block.topic.name != "/hopper/run"]
+        assert all((began_ns <= block.sent_ns).all() for block in blocks)
+        assert all((block.sent_ns < block.log_ns).all() for block in blocks)
 
 
 def test_gaps_duplicates_and_steps_back_are_told(graph, tmp_path):

@@ -91,10 +91,11 @@ class BagWriter(Writer):
         """Make all data written so far readable, even if the process is killed."""
         cast(McapWriter | SqliteWriter, self.storage).flush()
 
-    def write(self, connection: Connection, timestamp: int, data: bytes | memoryview) -> None:
-        """Write one message with its receive time [ns]."""
-        assert self.storage is not None
-        self.storage.write(connection, timestamp, data)
+    def write(
+        self, connection: Connection, timestamp: int, data: bytes | memoryview, sent_ns: int = 0
+    ) -> None:
+        """Write one message with its receive time [ns], and the time at which it was published [ns] where that is known."""
+        cast(McapWriter | SqliteWriter, self.storage).write(connection, timestamp, data, sent_ns)
         self.file.add(connection.id, timestamp, timestamp, 1, len(data))
 
     def write_arrays(self, parts: Sequence[tuple[Connection, NDArray[np.int64], NDArray[np.uint8]]]) -> None:

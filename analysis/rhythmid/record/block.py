@@ -38,7 +38,8 @@ def gather(buffer: bytes | memoryview, at: NDArray[np.int64], dtype: DTypeLike) 
 class Block:
     """Messages of one topic in the order in which they were recorded.
 
-    `start` and `size` give each message's bytes in `buffer`, `log_ns` its receive time [ns]; all int64[n].
+    `start` and `size` give each message's bytes in `buffer`, `log_ns` its receive time [ns], `sent_ns` the time [ns] at
+    which it was published; all int64[n]. `sent_ns` is None where that time is not recorded.
     """
 
     topic: Topic
@@ -46,6 +47,7 @@ class Block:
     start: NDArray[np.int64]
     size: NDArray[np.int64]
     log_ns: NDArray[np.int64]
+    sent_ns: NDArray[np.int64] | None = None
 
     def __len__(self) -> int:
         return len(self.start)
@@ -64,7 +66,7 @@ class Block:
             return self
         messages = [decompress(message, "zstd") for message in self]
         size = np.array([len(message) for message in messages], dtype=np.int64)
-        return Block(self.topic, b"".join(messages), np.cumsum(size) - size, size, self.log_ns)
+        return Block(self.topic, b"".join(messages), np.cumsum(size) - size, size, self.log_ns, self.sent_ns)
 
 
 def by_topic(
@@ -74,10 +76,12 @@ def by_topic(
     start: NDArray[np.int64],
     size: NDArray[np.int64],
     log_ns: NDArray[np.int64],
+    sent_ns: NDArray[np.int64] | None = None,
 ) -> Iterator[Block]:
     """Split messages into one block per topic. `number` is the topic of each message; messages of other topics are
     left out."""
     for key, topic in topics.items():
         mine = np.flatnonzero(number == key)
         if len(mine):
-            yield Block(topic, buffer, start[mine], size[mine], log_ns[mine]).plain()
+            sent = None if sent_ns is None else sent_ns[mine]
+            yield Block(topic, buffer, start[mine], size[mine], log_ns[mine], sent).plain()

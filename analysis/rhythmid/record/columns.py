@@ -22,6 +22,7 @@ class Columns:
     Attributes
     ----------
     log_ns : int64[n], receive time of each message [ns].
+    sent_ns : int64[n], the time at which it was published [ns]; None if the bag does not hold it.
     stamp_ns : int64[n], its header's stamp [ns]; None if the type has none.
     values : field -> float64[n]; NaN also where `missing`.
     missing : field -> bool[n], whether the message lacks the entry (a joint that it does not list).
@@ -31,11 +32,16 @@ class Columns:
 
     topic: Topic
     log_ns: NDArray[np.int64]
+    sent_ns: NDArray[np.int64] | None
     stamp_ns: NDArray[np.int64] | None
     values: Mapping[Field, NDArray[np.float64]]
     missing: Mapping[Field, NDArray[np.bool_]]
     reason: Mapping[Field, str]
     singly: int = 0
+
+    def times(self, kind: str) -> NDArray[np.int64] | None:
+        """Times [ns] of the messages by one of the `signals.BAG_CLOCKS`, int64[n]; None where they are not recorded."""
+        return {"header": self.stamp_ns, "sent": self.sent_ns, "receive": self.log_ns}[kind]
 
 
 @dataclass
@@ -47,6 +53,7 @@ class _Reader:
     direct: bool
     layout: Layout | None = None
     log_ns: list[NDArray[np.int64]] = field(default_factory=list)
+    sent_ns: list[NDArray[np.int64] | None] = field(default_factory=list)
     rows: list[NDArray[np.float64]] = field(default_factory=list)  # float64[fields, n] each
     missing: list[NDArray[np.bool_]] = field(default_factory=list)
     reason: dict[Field, str] = field(default_factory=dict)
@@ -74,6 +81,7 @@ class _Reader:
         else:
             missing = np.zeros(rows.shape, dtype=bool)
         self.log_ns.append(block.log_ns)
+        self.sent_ns.append(block.sent_ns)
         self.rows.append(rows)
         self.missing.append(missing)
 
@@ -122,15 +130,32 @@ class _Reader:
         if self.has_stamp:
             second, nanosecond = rows[-2:].astype(np.int64)
             stamp_ns = second * 1_000_000_000 + nanosecond
+        log_ns = np.concatenate([np.empty(0, dtype=np.int64), *self.log_ns])
+        sent = [part for part in self.sent_ns if part is not None]
+        sent_ns = np.concatenate(sent) if sent and len(sent) == len(self.sent_ns) else None
         return Columns(
             self.topic,
-            np.concatenate([np.empty(0, dtype=np.int64), *self.log_ns]),
+            log_ns,
+            # recorders that do not know when a message was published write the receive time
+            None if sent_ns is None or np.array_equal(sent_ns, log_ns) else sent_ns,
             stamp_ns,
             dict(zip(self.fields, rows, strict=False)),
             dict(zip(self.fields, missing, strict=False)),
             self.reason,
             self.singly,
         )
+
+
+def without_times(columns: Columns, kind: str) -> str:
+    """What is wrong and what to do where a topic has no times of this kind."""
+    if kind == "sent":
+        return (
+            f"{columns.topic.name}: the bag does not say when its messages were sent (MCAP files of Jazzy and later do); "
+            "use  time: receive  for this channel"
+        )
+    return (
+        f"{columns.topic.name}: {columns.topic.type} has no time stamp; use  time: receive  for this channel"
+    )
 
 
 def read_columns(

@@ -27,7 +27,7 @@ from rhythmid.record.message_types import typestore
 from rhythmid.record.other_lengths import length_notes, unequal_arrays
 from rhythmid.record.placeholder import placeholder_of
 from rhythmid.record.sign_bit import sign_bit_of, signed
-from rhythmid.record.signals import Clock
+from rhythmid.record.signals import BAG_CLOCKS, Clock
 from rhythmid.record.stated_rate import clock_of_counter, stated_rate
 from rhythmid.record.table import SUFFIXES, WIDEST, Table, is_table, table_suffix
 from rhythmid.record.table_clock import COUNTER, is_even, is_further_time, is_time, table_clock
@@ -67,7 +67,7 @@ class Recorded:
     sign_bit : place of the bit that is the sign of the recorded words; None where they are ordinary numbers.
     unit, scale : SI unit, empty where not stated, and its factor per recorded unit.
     time, value : float64[n], [s] and recorded values times `scale`; a message's time is its receive time.
-    stamped : whether its messages have stamps.
+    stamped, sent : whether its messages have stamps, and whether the bag says when they were sent.
     """
 
     said: str
@@ -82,6 +82,7 @@ class Recorded:
     scale: float = 1.0
     written_unit: str = ""
     stamped: bool = False
+    sent: bool = False
     side: str = ""
     sign_bit: int | None = None
 
@@ -112,7 +113,7 @@ class Inventory:
     @property
     def is_bag(self) -> bool:
         """Whether the source is a bag, not a table."""
-        return self.clock.kind in ("header", "receive")
+        return self.clock.kind in BAG_CLOCKS
 
 
 def inventory(source: str | Path, rate: float | None = None, vehicle: bool = False) -> Inventory:
@@ -272,8 +273,9 @@ def _filled(fields: list[Recorded], columns: Columns, begin: int) -> Iterator[Re
         value = value[kept][order]
         sign_bit = sign_bit_of(value)
         yield replace(
-            one, time=time[order], value=signed(value, sign_bit), stamped=stamped, sign_bit=sign_bit
-        )
+            one, time=time[order], value=signed(value, sign_bit), stamped=stamped, sent=columns.sent_ns is not None,
+            sign_bit=sign_bit,
+        )  # fmt: skip
 
 
 def _numbers(
@@ -341,8 +343,12 @@ def _names(message: Any, count: int, keys: tuple[str, ...]) -> list[str] | None:
 
 
 def header_clock(chosen: Mapping[str, Recorded]) -> tuple[Clock, str]:
-    """Stamps where every chosen topic has them, else receive times."""
+    """Stamps where every chosen topic has them, else the times at which messages were sent, else receive times."""
     without = sorted({one.topic for one in chosen.values() if not one.stamped})
+    if without and all(one.sent for one in chosen.values()):
+        return Clock(
+            "sent"
+        ), f"{', '.join(without)} bears no stamps, so the times at which messages were sent are compared"
     if without:
         return Clock("receive"), f"{', '.join(without)} bears no stamps, so times of receipt are compared"
     return Clock("header"), "all of these topics bear stamps"

@@ -155,10 +155,11 @@ class McapReader:
         at = np.array(found, dtype=np.int64)
         topics = {number: topic for number, topic in self._channels.items() if wanted(topic)}
         size = gather(data, at + 1, "<i8") - MESSAGE_HEAD_SIZE
-        log_ns, channel = gather(data, at + 15, "<i8"), gather(data, at + 9, "<u2")
+        log_ns, sent_ns = gather(data, at + 15, "<i8"), gather(data, at + 23, "<i8")
+        channel = gather(data, at + 9, "<u2")
         unknown, counts = np.unique(channel[~np.isin(channel, list(self._channels))], return_counts=True)
         self._undeclared.update(dict(zip(unknown.tolist(), counts.tolist(), strict=True)))
-        yield from by_topic(topics, channel, data, at + 31, size, log_ns)
+        yield from by_topic(topics, channel, data, at + 31, size, log_ns, sent_ns)
 
     def _chunk(self, at: int, end: int, wanted: Wanted, whole: bool) -> Iterator[Block]:
         """Messages of the chunk whose content starts at `at`; of an incomplete chunk, those that are present."""

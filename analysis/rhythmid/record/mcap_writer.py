@@ -111,11 +111,19 @@ class McapWriter:
         self._declared.append(declaration)
         self._undeclared += declaration
 
-    def write(self, connection: Connection, timestamp: int, data: bytes | memoryview) -> None:
-        """Write one message with its receive time [ns]."""
+    def write(
+        self, connection: Connection, timestamp: int, data: bytes | memoryview, sent_ns: int = 0
+    ) -> None:
+        """Write one message with its receive time [ns], and the time at which it was published [ns] where that is known."""
         self._single_rows.append((timestamp, connection.id, len(self._single)))
         self._single += struct.pack(
-            "<BQHIQQ", MESSAGE, MESSAGE_HEAD.itemsize - 9 + len(data), connection.id, 0, timestamp, timestamp
+            "<BQHIQQ",
+            MESSAGE,
+            MESSAGE_HEAD.itemsize - 9 + len(data),
+            connection.id,
+            0,
+            timestamp,
+            sent_ns or timestamp,
         )
         self._single += data
         if len(self._single) > CHUNK_SIZE:

@@ -15,7 +15,7 @@ from rhythmid.record.arrival_bursts import without_bursts
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.channel_quality import channel_quality
 from rhythmid.record.clocks import assumed_clock, clock_notes
-from rhythmid.record.columns import Columns
+from rhythmid.record.columns import Columns, without_times
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.held_command import with_held_commands, with_hold
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
@@ -233,16 +233,12 @@ def _from_columns(
             f"{source.place}no message of {source.topic} in {bag.path} has {source.field.text}: "
             f"{found.reason[source.field]}"
         )
-    stamped = source.clock(signals.time).kind == "header"
-    if stamped and found.stamp_ns is None:
-        raise InputError(
-            f"{source.place}{source.topic}: {found.topic.type} has no time stamp; use  time: receive  for this channel, "
-            "within its braces, or for all"
-        )
-    stamp_ns = found.stamp_ns if stamped else found.log_ns
-    assert stamp_ns is not None
+    clock = source.clock(signals.time).kind
+    stamp_ns = found.times(clock)
+    if stamp_ns is None:
+        raise InputError(f"{source.place}{without_times(found, clock)}, within its braces, or for all")
     kept = ~missing
-    lateness = np.asarray((found.log_ns - stamp_ns)[kept] * 1e-9) if stamped else None
+    lateness = None if clock == "receive" else np.asarray((found.log_ns - stamp_ns)[kept] * 1e-9)
     value = found.values[source.field][kept]
     if (placeholder := placeholder_of(value)) is not None:
         value = np.where(placeholder.where, np.nan, value)

@@ -56,7 +56,7 @@ TELLING = 1.0  # [s] between two progress messages
 def recover(path: str | Path, out: str | Path, storage: Storage = "mcap", tell: Tell = silent) -> Recovered:
     """Write every complete message of the incomplete or damaged bag `path` to the new bag `out`.
 
-    Topics, types, receive times and QoS are kept; the old bag is not changed. `tell` is called regularly with the
+    Topics, types, times and QoS are kept; the old bag is not changed. `tell` is called regularly with the
     number of messages written. Raises InputError when nothing can be read, or `out` exists or cannot be written.
     """
     bag = Bag(path, verify=True)
@@ -76,14 +76,19 @@ def recover(path: str | Path, out: str | Path, storage: Storage = "mcap", tell: 
                     except InputError as error:
                         left_out[name] = f"left out: {error}"
             messages = [
-                (start, block.topic.name, stamp, data)
+                (start, block.topic.name, stamp, data, sent)
                 for block in blocks
                 if block.topic.name in connections
-                for start, stamp, data in zip(block.start.tolist(), block.log_ns.tolist(), block)
+                for start, stamp, sent, data in zip(
+                    block.start.tolist(),
+                    block.log_ns.tolist(),
+                    (block.log_ns if block.sent_ns is None else block.sent_ns).tolist(),
+                    block,
+                )
                 if stamp >= 0  # no clock has negative times: such a message is damaged
             ]
-            for _, name, stamp, data in sorted(messages, key=itemgetter(0)):
-                writer.write(connections[name], stamp, data)
+            for _, name, stamp, data, sent in sorted(messages, key=itemgetter(0)):
+                writer.write(connections[name], stamp, data, sent if sent > 0 else 0)
                 counts[name] = counts.get(name, 0) + 1
             if time.monotonic() - told >= TELLING:
                 told = time.monotonic()

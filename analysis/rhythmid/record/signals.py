@@ -1,6 +1,6 @@
 """signals.yaml: mapping of recorded channels to roles.
 
-    time: header                      # header | receive | {column: t_ms, scale: 0.001} | {sample_rate: 610.3515625}
+    time: header                      # header | sent | receive | {column: t_ms, scale: 0.001} | {sample_rate: 610.3515625}
     input:   {topic: /hopper/excitation,   field: "effort[leg]"}
     output:  {topic: /hopper/joint_states, field: "position[leg]"}
     forcing: {topic: /hopper/forcing,      field: "effort[leg]"}
@@ -26,7 +26,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,14 +51,16 @@ OUTPUT_UNITS: dict[OutputKind, str] = {"position": "m", "velocity": "m/s", "acce
 KEYS = ConfigDict(extra="forbid")
 Part = tuple[float, float]  # start and end [s] of a part of a record
 WHOLE: Part = (-math.inf, math.inf)
+BagClock = Literal["header", "sent", "receive"]
+BAG_CLOCKS: tuple[BagClock, ...] = get_args(BagClock)
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Source of times: `header` stamps, `receive` times, a `column` of the table with numbers in units of `scale`
+    """Source of times: `header` stamps, times at which messages were `sent`, `receive` times, a `column` of the table with numbers in units of `scale`
     seconds, or a sample `rate` [Hz]."""
 
-    kind: Literal["header", "receive", "column", "rate"] = "header"
+    kind: BagClock | Literal["column", "rate"] = "header"
     column: str | int = ""
     rate: float = 0.0
     scale: float = 1.0
@@ -261,7 +263,7 @@ class _Clock:
     sample_rate: Annotated[Number, Limits(ge=1e-6, le=1e12)] | None = None
 
 
-AnyClock = Annotated[Annotated[_Clock, InKeys] | Annotated[Literal["header", "receive"], Plain], ByShape]
+AnyClock = Annotated[Annotated[_Clock, InKeys] | Annotated[BagClock, Plain], ByShape]
 
 
 @dataclass(frozen=True)
@@ -384,14 +386,14 @@ def _source(
     return replace(made, file=folder / given.file if given.file else default_file, column=given.column)
 
 
-def _clock(node: Node, given: _Clock | Literal["header", "receive"], tables: bool) -> Clock:
+def _clock(node: Node, given: _Clock | BagClock, tables: bool) -> Clock:
     if isinstance(given, str):
         if tables:
             node.fail("a table has no message times: give {sample_rate: 1000} in Hz or {column: t}")
         return Clock(given)
     if not tables:
         node.fail(
-            "column and sample_rate are for tables; the messages of a bag have times: header or receive"
+            "column and sample_rate are for tables; the messages of a bag have times: header, sent or receive"
         )
     if given.column is not None and given.sample_rate is None:
         return Clock("column", column=given.column, scale=1.0 if given.scale is None else given.scale)

@@ -37,8 +37,10 @@ class SqliteWriter(Sqlite3Writer):
         self.cursor = self.conn.cursor()
         self._checksum, self._summed, self._written = 0, 0, 0
 
-    def write(self, connection: Connection, timestamp: int, data: bytes | memoryview) -> None:
-        """Write one message with its receive time [ns]."""
+    def write(
+        self, connection: Connection, timestamp: int, data: bytes | memoryview, sent_ns: int = 0
+    ) -> None:
+        """Write one message with its receive time [ns]; rosbag2's tables (schema version 4) have no place for `sent_ns`."""
         super().write(connection, timestamp, data)
         self._sum(connection.id, timestamp, data)
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic
-from rhythmid.record.columns import read_columns
+from rhythmid.record.columns import read_columns, without_times
 from rhythmid.record.signals import Signals, Source
 from rhythmid.twin.twin import Role
 
@@ -37,7 +37,7 @@ class Inbox:
             self.channels["released"] = released
         self.topics = tuple(dict.fromkeys(source.topic for source in self.channels.values()))
         self._types: dict[str, Topic] = {}
-        self._waiting: dict[str, deque[tuple[bytes, int]]] = {topic: deque() for topic in self.topics}
+        self._waiting: dict[str, deque[tuple[bytes, int, int]]] = {topic: deque() for topic in self.topics}
         self.origin_ns: int | None = None
 
     @property
@@ -49,9 +49,9 @@ class Inbox:
         """Set the message type of a topic, with its definition where it is no standard type."""
         self._types[topic] = Topic(topic, type_name, "cdr", definition, "ros2msg" if definition else "")
 
-    def put(self, topic: str, data: bytes, received_ns: int) -> None:
-        """Store a received message."""
-        self._waiting[topic].append((data, received_ns))
+    def put(self, topic: str, data: bytes, received_ns: int, sent_ns: int) -> None:
+        """Store a message with the times [ns] at which it was received and sent."""
+        self._waiting[topic].append((data, received_ns, sent_ns))
 
     def drain(self) -> dict[Role, tuple[Array, Array]]:
         """Samples of all messages received since the last call: times [s] and values of each role.
@@ -73,12 +73,10 @@ class Inbox:
             if source.topic not in columns or source.field is None:
                 continue
             found = columns[source.topic]
-            header = source.clock(self._signals.time).kind == "header"
-            times = found.stamp_ns if header else found.log_ns
+            clock = source.clock(self._signals.time).kind
+            times = found.times(clock)
             if times is None:
-                raise InputError(
-                    f"{source.place}{source.topic}: {found.topic.type} has no time stamp; use  time: receive  for this channel"
-                )
+                raise InputError(f"{source.place}{without_times(found, clock)}")
             kept = ~found.missing[source.field]
             stamped[role] = times[kept], found.values[source.field][kept] * source.scale + source.one_offset
         first = [int(times[0]) for times, _ in stamped.values() if len(times)]
@@ -95,7 +93,7 @@ class Inbox:
         taken = [waiting.popleft() for _ in range(len(waiting))]
         if not taken:
             return None
-        size = np.array([len(data) for data, _ in taken], dtype=np.int64)
-        received = np.array([at for _, at in taken], dtype=np.int64)
-        buffer = b"".join(data for data, _ in taken)
-        return Block(self._types[topic], buffer, np.cumsum(size) - size, size, received)
+        size = np.array([len(data) for data, _, _ in taken], dtype=np.int64)
+        received, sent = np.array([times for _, *times in taken], dtype=np.int64).T
+        buffer = b"".join(data for data, _, _ in taken)
+        return Block(self._types[topic], buffer, np.cumsum(size) - size, size, received, sent)

@@ -82,7 +82,7 @@ class LiveBag(Worker):
         self._max_ns = round(storage.max_duration * 1e9) or 2**63
         self._max_size = storage.max_size or 2**63
         self._flushed_ns = 0
-        self._queue: deque[tuple[str, int, bytes]] = deque()
+        self._queue: deque[tuple[str, int, bytes, int]] = deque()
         self._topics: deque[tuple[str, str, Sequence[TopicEndpointInfo]]] = deque()
         self._connections: dict[str, Connection] = {}
         self._typestore = get_typestore(Stores.ROS2_JAZZY)
@@ -104,12 +104,12 @@ class LiveBag(Worker):
         learn(self._typestore, type_name)
         self._topics.append((topic, type_name, publishers))
 
-    def put(self, topic: str, receive_ns: int, data: bytes) -> None:
-        """Queue a message [ns since the epoch] of an announced topic."""
+    def put(self, topic: str, receive_ns: int, data: bytes, sent_ns: int = 0) -> None:
+        """Queue a message of an announced topic, with when it was received and sent [ns since the epoch; 0 if unknown]."""
         if len(self._queue) >= self._storage.queue_size:
             self.dropped += 1
         else:
-            self._queue.append((topic, receive_ns, data))
+            self._queue.append((topic, receive_ns, data, sent_ns))
 
     def split(self) -> None:
         """Begin the next file as soon as the queued messages have been written."""
@@ -142,7 +142,7 @@ class LiveBag(Worker):
 
     def _drain(self, writer: BagWriter) -> None:
         for _ in range(len(self._queue)):
-            topic, receive_ns, data = self._queue.popleft()
+            topic, receive_ns, data, sent_ns = self._queue.popleft()
             if topic not in self._connections:
                 self._connect(writer)
             file = writer.file
@@ -150,7 +150,7 @@ class LiveBag(Worker):
                 writer.split()
             if self._storage.by_message_time:
                 self._flush_when_due(writer, receive_ns)
-            writer.write(self._connections[topic], receive_ns, data)
+            writer.write(self._connections[topic], receive_ns, data, sent_ns)
         self._connect(writer)
         if self._split_asked.is_set():
             self._split_asked.clear()

@@ -151,14 +151,14 @@ class DelayInjector(GraphNode):
         since = 0 if self._start_ns is None else stamp_ns - self._start_ns
         return int(profile_delay(since, *self._profile))
 
-    def _on_lockstep(self, data: bytes, _received_ns: int) -> None:
+    def _on_lockstep(self, data: bytes, _received_ns: int, _sent_ns: int) -> None:
         stamp_ns = stamp_of(data)
         self._last_ns = max(stamp_ns + self._delay_at(stamp_ns), self._last_ns + 1)
         self._relayed += 1
         self._applied_ns += self._last_ns - stamp_ns
         self._output.publish(restamped(data, self._last_ns))
 
-    def _on_realtime(self, data: bytes, received_ns: int) -> None:
+    def _on_realtime(self, data: bytes, received_ns: int, _sent_ns: int) -> None:
         origin_ns = (
             stamp_of(data) if self.values["delay_from"] == "header" else received_ns or self._wall.now()
         )

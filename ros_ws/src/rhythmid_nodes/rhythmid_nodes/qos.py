@@ -94,8 +94,8 @@ class AdaptiveSubscription:
     """A raw subscription that is created as soon as the type and quality of service of a publisher are known, and created again for a
     publisher that it would not match.
 
-    `callback(data, received_ns)` gets a message and when the middleware received it [ns since the epoch], which on a busy
-    machine is long before the callback's turn; 0 if it does not say. `found(type_name, publishers)` is called once, before
+    `callback(data, received_ns, sent_ns)` gets a message, when the middleware received it [ns since the epoch], which on a
+    busy machine is long before the callback's turn, and when it was published; 0 if the middleware does not say. `found(type_name, publishers)` is called once, before
     the first message. A message for which `admits(about)` is false is left out.
     """
 
@@ -103,7 +103,7 @@ class AdaptiveSubscription:
         self,
         node: Node,
         topic: str,
-        callback: Callable[[bytes, int], None],
+        callback: Callable[[bytes, int, int], None],
         found: Callable[[str, Sequence[TopicEndpointInfo]], None] | None = None,
         depth: int = 2000,
         admits: Callable[[dict[str, Any]], bool] = lambda _about: True,
@@ -149,4 +149,4 @@ class AdaptiveSubscription:
         data, about = taken[0] if len(taken) == 1 else taken
         if self._admits(about):
             self._gaps.add(about["publication_sequence_number"])
-            self._callback(data, about["received_timestamp"])
+            self._callback(data, about["received_timestamp"], about["source_timestamp"])

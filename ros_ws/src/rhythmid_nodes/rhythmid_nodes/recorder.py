@@ -173,8 +173,8 @@ class Recorder(GraphNode):
                 self._begin_order()
                 self._streams = [known for known in self._tracks.values() if known.is_stream]
 
-        def receive(data: bytes, received_ns: int) -> None:
-            self._receive(topic, track, data, received_ns)
+        def receive(data: bytes, received_ns: int, sent_ns: int) -> None:
+            self._receive(topic, track, data, received_ns, sent_ns)
 
         taken = self.while_active(receive) if self.lockstep else receive
         self._inputs[topic] = AdaptiveSubscription(self, topic, taken, found)
@@ -193,7 +193,7 @@ class Recorder(GraphNode):
 
     # Messages
 
-    def _receive(self, topic: str, track: Track, data: bytes, received_ns: int) -> None:
+    def _receive(self, topic: str, track: Track, data: bytes, received_ns: int, sent_ns: int) -> None:
         track.received += 1
         if track.type_name == _TEXT:
             data = unpadded_text(data)
@@ -206,7 +206,7 @@ class Recorder(GraphNode):
             if self.lockstep:
                 self._put_in_order(topic, track, stamp_ns, data)
             else:
-                self._bag.put(topic, received_ns or self._wall.now(), data)
+                self._bag.put(topic, received_ns or self._wall.now(), data, sent_ns)
         if self._ack is not None and self._streams:
             self._ack.taken(min([stream.received for stream in self._streams]))
 

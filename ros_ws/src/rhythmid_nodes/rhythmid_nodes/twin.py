@@ -83,12 +83,12 @@ class _Ear:
         self.stamped = next(iter(fields.values()), "") == "std_msgs/Header"
         self._node.inbox.learn_type(self._topic, type_name)
 
-    def _receive(self, data: bytes, received_ns: int) -> None:
+    def _receive(self, data: bytes, received_ns: int, sent_ns: int) -> None:
         received_ns = received_ns or self._node.wall.now()
         self.count += 1
         if self.stamped:
             self.lateness.add(max(0, received_ns - stamp_of(data)))
-        self._node.inbox.put(self._topic, data, received_ns)
+        self._node.inbox.put(self._topic, data, received_ns, sent_ns or received_ns)
 
     def rate(self) -> float:
         """Messages per second since about a second ago."""
