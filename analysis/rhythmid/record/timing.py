@@ -20,6 +20,12 @@ NEIGHBOURS = 25
 SPANS = (1, 2, 4, 8, 16, 32)
 # ratio to the usual span's mean step below which the usual step lies within a burst of delayed messages
 BURSTS = 0.5
+# samples after a step, as a multiple of those before it, whose earliest shows whether any is missing: a busy computer
+# works off its backlog within some tenths of a second
+CATCHING_UP = 10
+# parts of a record in bursts of which one step is the usual one: long enough for the length of a burst not to matter, short
+# enough for most parts to be without a gap
+PARTS = 8
 FULL = 0.5  # least delay of the earliest sample after a gap, as a share of the missing periods
 # largest number of long steps used to detect irregular stamps: more steps take time without changing the result
 JUDGED = 500
@@ -118,7 +124,7 @@ def gaps_between(time: Times) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Gaps in increasing times (n,): for each the sample before it (g,), and the number of missing samples (g,).
 
     A step of more than 1.5 periods that the surrounding steps compensate is stamp jitter or a burst of delayed
-    messages, and no gap. No message is early, so after a real gap even the earliest of the next samples is late.
+    messages, and no gap; a busy computer may take some tenths of a second to catch up. No message is early, so after a real gap even the earliest of the next samples is late.
     Among irregular stamps only a pause is a gap. A channel in which long steps are common, such as a command that
     is sent when it changes, has no gaps.
     """
@@ -138,20 +144,21 @@ def _gaps(time: Times, period: float, pause: float | None) -> tuple[NDArray[np.i
     lost = np.maximum(np.rint(step[wide] / period - 1.0).astype(np.int64), 1)
     if pause is not None:
         return wide, lost
-    real = _not_made_up_for(time, period, wide, lost)
+    real = _not_made_up_for(time, period, wide, lost, CATCHING_UP)
     return wide[real], lost[real]
 
 
 def _not_made_up_for(
-    time: Times, period: float, wide: NDArray[np.int64], lost: NDArray[np.int64]
+    time: Times, period: float, wide: NDArray[np.int64], lost: NDArray[np.int64], longer: int = 1
 ) -> NDArray[np.bool_]:
     """Whether the stamps around `wide` steps (w,), with `lost` (w,) apparently missing samples, do not compensate
-    them."""
+    them. Behind a step `longer` times as many stamps are looked at as before it."""
     late = time - period * np.arange(len(time))
     real = np.zeros(len(wide), dtype=bool)
     for index, (before, count) in enumerate(zip(wide, 2 * lost + NEIGHBOURS, strict=True)):
-        earlier, later = late[max(before + 1 - count, 0) : before + 1], late[before + 1 : before + 1 + count]
-        share = FULL if min(len(earlier), len(later)) == count else AT_AN_END
+        earlier = late[max(before + 1 - count, 0) : before + 1]
+        later = late[before + 1 : before + 1 + longer * count]
+        share = FULL if min(len(earlier), len(later)) >= count else AT_AN_END
         real[index] = later.min() - earlier.min() > share * period * lost[index]
     return real
 
@@ -201,9 +208,8 @@ def _usual_step(step: Times) -> tuple[float, bool]:
     )  # an existing step, where there are two kinds of steps
     time = np.concatenate([[0.0], np.cumsum(step)])
     longest = max(count for count in SPANS if count <= len(step))
-    usual = float(np.median(time[longest:] - time[:-longest])) / longest
-    if period < BURSTS * usual:
-        return usual, True
+    if period < BURSTS * _mean_step(time, longest):
+        return _mean_step(time, max(longest, len(step) // PARTS)), True
     even = False
     for steps in (count for count in SPANS if count <= len(step)):
         span = time[steps:] - time[:-steps]
@@ -216,6 +222,11 @@ def _usual_step(step: Times) -> tuple[float, bool]:
     whole = round(period * 1e9) * 1e-9
     exact = whole == 0.0 or (even and abs(whole - period) * len(step) > 0.5 * SAME)
     return period if exact else whole, False
+
+
+def _mean_step(time: Times, count: int) -> float:
+    """Median over all spans of `count` steps between times (n,) of their mean step [s]."""
+    return float(np.median(time[count:] - time[:-count])) / count
 
 
 def put_in_order(time: Times, label: str, mend: str) -> NDArray[np.int64]:
