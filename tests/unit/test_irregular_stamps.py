@@ -120,7 +120,7 @@ def sent_by_a_busy_computer(seed: int, until: float, behind: float) -> np.ndarra
 def test_commands_that_a_busy_computer_sends_late_are_not_lost(seed, until, behind):
     timing = Timing.of(sent_by_a_busy_computer(seed, until, behind))
     assert (timing.gaps, timing.lost, timing.usual_range) == (0, 0, None)
-    assert timing.period == pytest.approx(1e-3, rel=1e-3)
+    assert timing.period == pytest.approx(1e-3, rel=2e-3)
 
 
 @pytest.mark.parametrize(("until", "behind"), [(2.2, 0.0), (2.2, 0.01), (3.9, 0.004)])
