@@ -80,3 +80,18 @@ def test_runs_of_one_layout_and_runs_at_different_times_are_refused(tmp_path):
 def test_check_tells_the_size_of_all_tables(tmp_path):
     folder = arm(tmp_path / "log")
     assert size_of(folder) == sum(one.stat().st_size for one in folder.iterdir())
+
+
+def test_tables_of_one_folder_without_times_are_read_by_the_rate_that_is_given(tmp_path):
+    time = 0.004 * np.arange(800)
+    angles = np.column_stack([0.3 * np.sin(3.0 * time), 0.1 * np.cos(5.0 * time)])
+    for name, table in (("position", angles), ("torque", -2.0 * angles), ("filtered", angles[1:, 0])):
+        np.savetxt(tmp_path / f"data_{name}.csv", table, delimiter=",")
+    with pytest.raises(InputError, match="--rate HZ"):
+        inventory(tmp_path)
+    begun = start([tmp_path], rate=250.0)
+    roles = {role: choice.recorded.column for role, choice in begun.guess.roles.choices.items()}
+    assert roles == {"output": "data_position.0", "input": "data_torque.0"}
+    signals = tmp_path.parent / "signals.yaml"
+    signals.write_text(begun.signals, encoding="utf-8")
+    np.testing.assert_allclose(load(tmp_path, signals).output.time, time)

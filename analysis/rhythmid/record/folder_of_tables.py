@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.record import FEWEST_COMMON_SAMPLES
+from rhythmid.record.stream import Stream, on_all_times
 from rhythmid.record.table_clock import table_clock
 from rhythmid.record.text_table import TEXT
 from rhythmid.record.time_origin import CALENDAR
@@ -23,12 +24,15 @@ BAGS = ("*.mcap*", "*.db3*", "*.bag", "metadata.yaml")
 
 
 @dataclass(frozen=True, eq=False)
-class Stream:
-    """One table: its times [s] and its columns (n,) by name, without the time."""
+class Part:
+    """One table of a folder: its name, and its columns (n,) by name, without words."""
 
     name: str
-    time: Array
-    columns: Mapping[str, Array]
+    columns: list[tuple[str, Array]]
+
+    def named(self, column: str) -> str:
+        """The name of a column in the table of the whole folder."""
+        return f"{self.name}.{column}"
 
 
 def is_folder_of_tables(path: Path) -> bool:
@@ -50,59 +54,70 @@ def read_folder(
     path: Path, vectors: Callable[[Path], list[tuple[str, Array]]]
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """The columns of all tables, `motor.current` for the column `current` of motor.csv, on the times of all of them and
-    NaN where a table has no row; and a message on each table that is left out.
+    NaN where a table has no row; and a message on each table that is left out. Where none of them has a time, their rows
+    are of one clock, and the columns are those of all.
 
     `vectors` reads the columns of one table. Raises InputError where the tables are several recordings.
     """
-    streams: list[Stream] = []
+    streams: dict[str, Stream] = {}
+    untimed: dict[str, Any] = {}
     notes: list[str] = []
     for file in _tables_in(path):
         try:
-            streams.append(_stream(file, vectors(file)))
+            part = _part(file, vectors(file))
         except InputError as error:
-            notes.append(f"{file.name} is left out: {str(error).removeprefix(f'{file}: ')}")
+            notes.append(_left_out(file, error))
+            continue
+        try:
+            streams[part.name] = _stream(file, part)
+        except InputError as error:
+            notes.append(_left_out(file, error))
+            untimed |= {part.named(name): value for name, value in part.columns}
+    if not streams and untimed:
+        return untimed, ()
     if not streams:
         raise InputError(f"{path}: none of its tables can be read: {'; '.join(notes)}")
     _require_one_recording(path, streams)
-    time = np.unique(np.concatenate([one.time for one in streams]))
-    columns: dict[str, Any] = {TIME: time}
-    for one in streams:
-        places = np.searchsorted(time, one.time)
-        for name, values in one.columns.items():
-            whole = np.full(len(time), np.nan)
-            whole[places] = values
-            columns[f"{one.name}.{name}"] = whole
-    return columns, tuple(notes)
+    return on_all_times(list(streams.values()), TIME), tuple(notes)
+
+
+def _left_out(file: Path, error: InputError) -> str:
+    return f"{file.name} is left out: {str(error).removeprefix(f'{file}: ')}"
 
 
 def _tables_in(path: Path) -> list[Path]:
     return sorted(one for one in path.iterdir() if one.suffix.lower() in TEXT and one.is_file())
 
 
-def _stream(file: Path, columns: list[tuple[str, Array]]) -> Stream:
-    """Raises InputError where the table has too few rows, or no time."""
+def _part(file: Path, columns: list[tuple[str, Array]]) -> Part:
+    """Raises InputError where the table has too few rows."""
     count = max((len(value) for _, value in columns), default=0)
     if count < FEWEST_COMMON_SAMPLES:
         raise InputError(f"{file}: it has {count} rows")
-    alike = [(name, value) for name, value in columns if len(value) == count]
-    clock, _ = table_clock(file, alike, [])
-    found = dict(alike)
+    return Part(file.name.split(".")[0], [(name, value) for name, value in columns if len(value) == count])
+
+
+def _stream(file: Path, part: Part) -> Stream:
+    """Raises InputError where the table has no time."""
+    clock, _ = table_clock(file, part.columns, [])
+    found = dict(part.columns)
     time = found.pop(str(clock.column)) * clock.scale
-    return Stream(file.name.split(".")[0], time, found)
+    return Stream(time, {part.named(name): value for name, value in found.items()})
 
 
-def _require_one_recording(path: Path, streams: list[Stream]) -> None:
+def _require_one_recording(path: Path, streams: Mapping[str, Stream]) -> None:
     """Raise InputError where the tables do not share their time, or are runs of one layout on clocks of their own."""
     apart = f"give them one by one, such as  rhythmid init {path}/*.csv"
-    layouts = {tuple(one.columns) for one in streams}
-    if len(layouts) < len(streams) and min(float(one.time[0]) for one in streams) < CALENDAR:
+    layouts = {tuple(name.removeprefix(f"{own}.") for name in one.columns) for own, one in streams.items()}
+    if len(layouts) < len(streams) and min(float(one.time[0]) for one in streams.values()) < CALENDAR:
         raise InputError(
             f"{path}: tables in it have the same columns, so that they are several recordings; {apart}"
         )
-    longest = max(streams, key=lambda one: float(one.time[-1] - one.time[0]))
-    for one in streams:
-        both = min(one.time[-1], longest.time[-1]) - max(one.time[0], longest.time[0])
+    longest = max(streams, key=lambda own: float(streams[own].time[-1] - streams[own].time[0]))
+    for own, one in streams.items():
+        other = streams[longest]
+        both = min(one.time[-1], other.time[-1]) - max(one.time[0], other.time[0])
         if both < COMMON * (one.time[-1] - one.time[0]):
             raise InputError(
-                f"{path}: {one.name} and {longest.name} were not recorded at the same time: they are several recordings; {apart}"
+                f"{path}: {own} and {longest} were not recorded at the same time: they are several recordings; {apart}"
             )

@@ -26,6 +26,7 @@ from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.matlab_class import signals_of
 from rhythmid.record.matlab_objects import complaint_of_objects
 from rhythmid.record.own_process import arrays_in_own_process
+from rhythmid.record.paired_times import with_common_time
 from rhythmid.record.placeholder import Placeholder, without_placeholders
 from rhythmid.record.rows_without_time import without_untimed_rows
 from rhythmid.record.table_clock import is_called_time
@@ -93,7 +94,7 @@ class Table:
                 check_content(path)
                 found = read(path)
             columns, notes = found if isinstance(found, tuple) else (found, ())
-            columns, untimed = without_untimed_rows(with_joined_stamps(columns))
+            columns, untimed = without_untimed_rows(with_common_time(with_joined_stamps(columns)))
             notes = (*notes, *untimed)
         except FileNotFoundError:
             raise InputError(f"{path}: no such file") from None

@@ -142,8 +142,11 @@ def has_time(columns: Sequence[tuple[str, Array]]) -> bool:
 def _is_untold_time(name: str, value: Array) -> bool:
     """Whether a column that is not named as a time is one by its steps; a column of row numbers only if it has no
     name."""
-    untold = COUNTER.fullmatch(name) is None and not heading_of(name).unit
-    return untold and is_even(value) and (name.isdigit() or not bool((np.diff(value) == 1.0).all()))
+    if heading_of(name).unit or not is_even(value):
+        return False
+    step = np.diff(value)
+    counts = COUNTER.fullmatch(name) is not None and bool((step == np.round(step)).all())
+    return not counts and (name.isdigit() or not bool((step == 1.0).all()))
 
 
 def table_clock(

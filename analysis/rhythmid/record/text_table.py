@@ -22,6 +22,7 @@ from rhythmid.record.heading import heading_of
 from rhythmid.record.labelled_rows import labels_of, read_labelled
 from rhythmid.record.list_cells import list_of, lists_of
 from rhythmid.record.lvm_head import lvm_head
+from rhythmid.record.matrix_literal import rows_of_matrix
 from rhythmid.record.measured_cells import is_measured, measured
 from rhythmid.record.optional_cells import optional_cells
 from rhythmid.record.settings_above import without_settings
@@ -36,6 +37,7 @@ SEPARATORS = ("\t", ";", ",", None)  # None: any number of spaces; in this order
 LOOKED_AT = 200  # lines used to detect the dialect: more than any head has
 UNIT_OR_END = re.compile(r"(\s*[\[({<][^\[({<]*)?$")  # end of a column's name
 LONGEST_LABEL = 3  # words before the colon of a labelled comment: `Names of columns: t y u`
+WIDE_GAP = re.compile(r"\s{2,}")  # between names of several words
 ACROSS = 10  # ratio of columns to rows above which the lines of a table without names are its columns
 
 
@@ -79,7 +81,7 @@ def text_table(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     Raises InputError where the file is empty or its names do not match the rows; ValueError where a row is damaged.
     """
     with opened(path) as file:
-        begin = list(islice(unbroken(file), LOOKED_AT))
+        begin = list(islice(unbroken(rows_of_matrix(file)), LOOKED_AT))
     if labels := labels_of(begin):
         with opened(path) as file:
             labelled = read_labelled(file, labels)
@@ -98,12 +100,12 @@ def table_of(
     `begin` its first lines, without broken cells, where `lines` can be read only once."""
     if begin is None:
         lines = list(lines)
-        begin = list(islice(unbroken(lines), LOOKED_AT))
+        begin = list(islice(unbroken(rows_of_matrix(lines)), LOOKED_AT))
     optional = optional_cells(begin)
     if optional is not None:
         begin = list(optional.filled(begin))
     dialect, lvm = dialect_of(begin, name), lvm_head(begin)
-    whole = unbroken(lines)
+    whole = unbroken(rows_of_matrix(lines))
     body = islice(whole if optional is None else optional.filled(whole), dialect.first, None)
     rows = rows_in(body, dialect.first, dialect.separator, dialect.head)
     count = len(dialect.names)
@@ -231,6 +233,8 @@ def _names_above(above: list[list[str]], last: str, count: int) -> list[list[str
     """
     if not above or len(above[-1]) == count:
         return above
+    if len(above[-1]) > count and len(cells := WIDE_GAP.split(last.strip())) == count:
+        return [*above[:-1], cells]
     for separator in SEPARATORS:
         if len(cells := cells_of(last, separator)) == count and len(above[-1]) == 1:
             return [*above[:-1], cells]
