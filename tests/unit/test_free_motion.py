@@ -81,3 +81,31 @@ def test_an_angle_that_is_driven_and_then_coasts_is_free_from_its_largest_speed_
 def test_half_a_swing_and_a_fall_are_free_from_their_first_sample_on():
     assert freed(record(np.cos(np.pi * TIME / TIME[-1]))) is None
     assert freed(record(4.9 * TIME**2)) is None
+
+
+def pushed_again(first: float, again: float) -> np.ndarray:
+    """Angle (n,) of a pendulum that a hand pushes at two times [s]."""
+    angle, speed, found = 0.0, 0.0, []
+    for time in TIME:
+        push = -130.0 if any(begin <= time < begin + 0.1 for begin in (first, again)) else 0.0
+        found.append(angle)
+        speed += PERIOD * (push - 100.0 * np.sin(angle) - 0.2 * speed)
+        angle += PERIOD * speed
+    return np.array(found)
+
+
+def test_of_a_motion_that_is_pushed_again_the_longest_part_between_two_pushes_is_free():
+    found = freed(record(pushed_again(0.5, 6.0)))
+    assert found is not None and found.pushed and 0.6 <= found.begin < 1.0
+    assert found.end is not None and 5.0 < found.end <= 6.0
+    said = " ".join(rests_of(record(pushed_again(0.5, 6.0))))
+    assert "it gains speed again after t = " in said and f", {found.end:.3f}]" in said
+
+
+def test_a_swing_by_hand_before_the_release_is_no_part_of_the_free_motion():
+    lifted = 0.03 * np.sin(12.0 * TIME) * (TIME < 1.0) - 0.5 * (
+        1.0 - np.cos(np.pi * np.clip(TIME - 1.0, 0.0, 1.0))
+    )
+    free = np.interp(TIME - 2.0, TIME, thrown(0.0)[:, 0])
+    found = freed(record(np.where(TIME < 2.0, lifted, free)))
+    assert found is not None and found.pushed and 2.0 <= found.begin < 2.3 and found.end is None

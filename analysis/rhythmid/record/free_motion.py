@@ -1,10 +1,12 @@
-"""Where a motion that nothing recorded drives becomes free: after a rest in which it was held, and after a push by hand.
+"""The part of a motion that nothing recorded drives in which it is free: after a rest in which it was held, between pushes
+by hand.
 
 A free machine with one degree of freedom only loses energy. So it passes through a place more slowly each time, and a
 passage that is faster than the one before shows that something pushed it in between.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,25 +34,36 @@ LEAST_GAIN = 0.01  # least increase of the squared speed, as a share of its larg
 # least ratio of the time in which a motion of one direction loses speed to that in which it gained it, for a push: a machine
 # that swings to the other side takes as long for either
 COASTING = 2.0
-LEAST_PASSAGES = 2  # passages without a push after the last one, so that the motion is free at all
+LEAST_PASSAGES = 2  # passages without a push between two, so that the motion is free at all
 
 
 @dataclass(frozen=True)
 class Freed:
-    """The time `begin` [s] from which a motion is free, and the time `until` [s] up to which it was held, or `pushed`
-    at least."""
+    """The time `begin` [s] from which a motion is free, the time `until` [s] up to which it was held, or `pushed`
+    at least, and the time `end` [s] up to which it is free, None where it is to the end of the record."""
 
     begin: float
     until: float
     pushed: bool
+    end: float | None = None
+
+
+@dataclass(frozen=True)
+class Span:
+    """The strokes without a push between them: the first and the last of them, counted from 0, of all `count`."""
+
+    first: int
+    last: int
+    count: int
 
 
 def freed(record: Record) -> Freed | None:
-    """Where a motion becomes free that nothing recorded drives at first; None where it is free or driven from its start.
+    """Where a motion is free that nothing recorded drives at first; None where it is free throughout, or driven from its
+    start.
 
-    After a push it is taken from its fastest point on: a hand may still lead it up to there. A motion of one direction that gains
-    speed and loses it for much longer counts as pushed: a release through which it comes to rest on the same side is nearly as free
-    from its fastest point on.
+    Between pushes it is taken from its fastest point after the one to the last but one turning point before the other: a hand may
+    still, or already, lead it elsewhere. A motion of one direction that gains speed and loses it for much longer counts as pushed: a release
+    through which it comes to rest on the same side is nearly as free from its fastest point on.
     """
     if record.output_kind == "acceleration" or len(record.output) < 4 * FIRST:
         return None
@@ -62,10 +75,9 @@ def freed(record: Record) -> Freed | None:
     if len(time) < PLACES:
         return None if rest is None else Freed(rest, rest, False)
     strokes = _strokes(speed)
-    last = _last_push(position, speed, strokes)
-    if last is not None and not _drives(record, float(time[-1])):
-        after = strokes[last + 1]
-        return Freed(_fastest(time, speed, after), float(time[after.start]), True)
+    span = _free_span(position, speed, strokes)
+    if span is not None and not _drives(record, float(time[-1])):
+        return _between_pushes(time, speed, strokes, span, rest)
     away = strokes[0] if len(strokes) else slice(0, len(time))
     unseen = record.output_kind == "velocity" and rest is not None
     if not _turns(speed) and (unseen or (not _drives(record, float(time[-1])) and _coasts(time, speed))):
@@ -134,30 +146,46 @@ def _strokes(speed: Array) -> list[slice]:
     return made
 
 
-def _last_push(position: Array, speed: Array, strokes: list[slice]) -> int | None:
-    """The last of the first strokes after which the machine passes through the same places faster than in it; None
-    where it does so at no stroke, or again and again."""
-    gains = [_gains(position, speed, one, other) for one, other in zip(strokes, strokes[1:])]
-    if not gains or not gains[0]:
+def _free_span(position: Array, speed: Array, strokes: list[slice]) -> Span | None:
+    """The span of most strokes in which the machine passes through the same places more slowly each time; None where
+    that are all strokes, or no more than in the other spans together: then it is driven."""
+    changes = [_change(position, speed, one, other) for one, other in zip(strokes, strokes[1:])]
+    edges = [-1, *(place for place, change in enumerate(changes) if change > 0), len(changes)]
+
+    def losses(span: tuple[int, int]) -> int:
+        return changes[span[0] + 1 : span[1]].count(-1)
+
+    first, last = longest = max(pairwise(edges), key=losses)
+    if len(edges) == 2 or losses(longest) < LEAST_PASSAGES or 2 * losses(longest) <= changes.count(-1):
         return None
-    last = gains.index(False) - 1 if False in gains else len(gains) - 1
-    after = gains[last + 1 :]
-    return last if len(after) >= LEAST_PASSAGES and not any(after) else None
+    return Span(first + 1, last, len(strokes))
 
 
-def _gains(position: Array, speed: Array, one: slice, other: slice) -> bool:
-    """Whether a stroke is clearly faster than the one before at the places of both."""
+def _between_pushes(time: Array, speed: Array, strokes: list[slice], span: Span, rest: float | None) -> Freed:
+    end = None if span.last == span.count - 1 else float(time[strokes[span.last].start])
+    if span.first == 0:
+        begin = float(time[0]) if rest is None else rest
+        return Freed(begin, begin, False, end)
+    after = strokes[span.first]
+    return Freed(_fastest(time, speed, after), float(time[after.start]), True, end)
+
+
+def _change(position: Array, speed: Array, one: slice, other: slice) -> int:
+    """1 where a stroke is clearly faster than the one before at the places of both, −1 where it is no faster, and 0 where
+    neither shows."""
     before, after = position[one], position[other]
     low, high = max(before.min(), after.min()), min(before.max(), after.max())
     if high - low < LEAST_WAY * np.ptp(position):
-        return False
+        return 0
     places = np.linspace(low, high, PLACES)
     squared = []
     for part, x in ((one, before), (other, after)):
         order = np.argsort(x)
         squared.append(float(np.mean(np.interp(places, x[order], speed[part][order] ** 2))))
     increase = squared[1] - squared[0]
-    return squared[1] > GAIN * squared[0] and increase > LEAST_GAIN * float(np.max(speed**2))
+    if squared[1] > GAIN * squared[0] and increase > LEAST_GAIN * float(np.max(speed**2)):
+        return 1
+    return -1 if increase <= 0.0 else 0
 
 
 def _coasts(time: Array, speed: Array) -> bool:

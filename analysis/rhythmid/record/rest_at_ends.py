@@ -31,10 +31,15 @@ def rests_of(record: Record) -> tuple[str, ...]:
             f"it gains speed until t = {_written(free.until)} s at least, though nothing that drives it was recorded: it was pushed, which no model "
             f"of the machine does; begin where it moves freely:  {use_line(record)}"
         )
-    elif free is not None:
+    elif free is not None and free.until > time[0]:
         found.append(
             f"it rests for the first {free.until - time[0]:.3g} s and then moves, though nothing that drives it was recorded: it was held or "
             f"pushed, which no model of the machine does; begin where it moves freely:  {use_line(record)}"
+        )
+    if free is not None and free.end is not None:
+        found.append(
+            f"it gains speed again after t = {_written(free.end)} s, though nothing that drives it was recorded: it was pushed; end before that:  "
+            f"{use_line(record)}"
         )
     if end is not None:
         found.append(
@@ -51,6 +56,8 @@ def use_line(record: Record) -> str | None:
     if free is None and end is None:
         return None
     first = math.floor(time[0]) if free is None else free.begin
+    if free is not None and free.end is not None:
+        end = free.end
     last = math.ceil(time[-1]) if end is None else end
     return f"use: [{_written(first + record.use_zero)}, {_written(last + record.use_zero)}]"
 
