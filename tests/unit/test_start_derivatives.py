@@ -85,3 +85,25 @@ def test_a_number_that_is_the_derivative_of_another_is_its_speed(tmp_path):
     roles = guess_roles(written(tmp_path / "run.csv", {"angle": angle, "angle_b": np.gradient(angle, TIME)}))
     assert roles.choices["output"].recorded.column == "angle"
     assert roles.choices["velocity"].recorded.column == "angle_b"
+
+
+def test_a_number_without_a_meaning_whose_derivative_was_recorded_is_the_motion_whatever_letters_stand_beside_it(
+    tmp_path,
+):
+    rng = np.random.default_rng(4)
+    moved = np.convolve(rng.standard_normal(len(TIME)), np.hanning(60) / 30.0, "same")
+    speed = np.gradient(moved, TIME)
+    supply = 2.0 + np.convolve(rng.standard_normal(len(TIME)), np.hanning(200) / 20.0, "same")
+    table = {
+        "t": TIME,
+        "A": np.gradient(speed, TIME),
+        "D": moved,
+        "Y": supply,
+        "V": speed,
+        "F": 3.0 * speed + moved,
+    }
+    write_columns(tmp_path / "run.csv", table)
+    roles = guess_roles(inventory(tmp_path / "run.csv")).choices
+    assert {role: choice.recorded.column for role, choice in roles.items()} == {
+        "output": "D", "velocity": "V", "input": "F",
+    }  # fmt: skip

@@ -29,7 +29,7 @@ from rhythmid.start.poses import with_joint_positions
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along, runs_like_a_clock
 from rhythmid.start.role_choice import Ask, Choice, Known, pick, ranked_by_worth
 from rhythmid.start.rotary import rotary_of, rotary_of_wrench
-from rhythmid.start.slopes import without_slopes
+from rhythmid.start.slopes import with_integrals, without_slopes
 from rhythmid.start.step_before import BEFORE, duty_before, gone_to_set_point, set_point_before, step_before
 from rhythmid.start.symbols import with_symbols
 from rhythmid.start.targets import with_targets
@@ -72,7 +72,7 @@ def guess_roles(
         Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one) and not _is_clock(one)
     ]
     known, twice = written_once(
-        without_slopes(with_symbols(_without_empty_letters(with_joint_positions(known))))
+        with_integrals(without_slopes(with_symbols(_without_empty_letters(with_joint_positions(known)))))
     )
     everything = [*known, *(Known(one, meaning_of(one)) for one in found.constant)]
     known, resting = (with_targets(part, everything) for part in (known, everything[len(known) :]))

@@ -1,6 +1,7 @@
-"""Numbers that are the derivative of a recorded position, whatever their names say."""
+"""Numbers that are the derivative of a recorded position, or the integral of a recorded velocity, whatever their names say."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from rhythmid.start.meaning import words_of
 from rhythmid.start.relation import RATIO, SURE_INTEGRAL, derivative
@@ -23,6 +24,24 @@ def without_slopes(known: Sequence[Known]) -> list[Known]:
             if r > SURE_INTEGRAL and abs(ratio - 1.0) < RATIO:
                 found[id(slope)] = f"it is the derivative of {position.one} ({r:.2f} correlation)"
     return [one.taken_for("velocity", found[id(one)]) if id(one) in found else one for one in known]
+
+
+def with_integrals(known: Sequence[Known]) -> list[Known]:
+    """The numbers, with those without a meaning taken for positions that are clearly the integral of a velocity, in
+    consistent units: `D` beside `V`. Two axes in quadrature are each other's integrals in no such unit as a rule."""
+    slopes = [one for one in known if one.quantity == "velocity" and one.meaning.commanded is not True]
+    return [
+        _integral(one, slopes) if one.quantity is None and not one.meaning.commanded else one for one in known
+    ]
+
+
+def _integral(one: Known, slopes: Sequence[Known]) -> Known:
+    for slope in slopes:
+        r, ratio = derivative(one.one, slope.one)
+        if r > SURE_INTEGRAL and abs(ratio - 1.0) < RATIO:
+            found = one.taken_for("position", f"it is the integral of {slope.one} ({r:.2f} correlation)")
+            return replace(found, meaning=replace(found.meaning, certain=True))
+    return one
 
 
 def _alike(position: Known, slope: Known) -> bool:
