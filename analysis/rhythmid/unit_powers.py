@@ -22,6 +22,12 @@ def reduced(unit: str) -> str:
     return ("*".join(over) or "1") + (f"/({below})" if len(under) > 1 else f"/{below}" if under else "")
 
 
+def are_same(first: str, second: str) -> bool:
+    """Whether two units are the same product of powers, however they are written: 1*s/rad and s/rad."""
+    powers = _powers(first)
+    return first == second or (powers is not None and powers == _powers(second))
+
+
 def is_product(unit: str) -> bool:
     """Whether a text is a product of powers of names."""
     return _powers(unit) is not None

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from rhythmid.errors import InputError
 from rhythmid.record.heading import NOT_SI
-from rhythmid.unit_powers import is_product, reduced
+from rhythmid.unit_powers import are_same, is_product, reduced
 
 
 @lru_cache(maxsize=1)
@@ -49,7 +49,7 @@ class Units:
     def check(self, given: str, expected: str, where: str) -> None:
         """Raise InputError unless `given` is the unit that this machine uses for `expected`."""
         wanted = self.of(expected)
-        if _plain(given) == _plain(wanted):
+        if are_same(_plain(given), _plain(wanted)):
             return
         problem = f"{where}: unit {given!r} where {wanted!r} is expected"
         if not {self.force, self.position, self.mass} <= {"N", "m", "kg", "N*m", "rad", "kg*m^2"}:

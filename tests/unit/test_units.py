@@ -14,6 +14,11 @@ def test_a_unit_may_be_spelled_in_several_ways(spelling):
     TRANSLATIONAL.check(spelling, "N*s/m", "here")
 
 
+@pytest.mark.parametrize("spelling", ["s/rad", "1*s/rad", "1/(rad/s)"])
+def test_a_unit_of_a_machine_whose_force_has_none_may_be_spelled_without_it(spelling):
+    Units("1", "rad", "s^2/rad").check(spelling, "N*s/m", "here")
+
+
 @pytest.mark.parametrize(
     ("wrong", "expected", "advice"),
     [
