@@ -2,10 +2,12 @@
 several words, a time without a name."""
 
 import numpy as np
+from scipy.io import savemat
 
 from rhythmid.record.inventory import inventory
 from rhythmid.record.read import read_record
 from rhythmid.record.table import Table
+from rhythmid.start.start import start
 
 N = 300
 TIME = 0.01 * np.arange(N)
@@ -69,3 +71,17 @@ def test_a_column_without_a_name_is_the_time_unless_it_counts_the_rows(tmp_path)
     rows = "\n".join(f"{k + 14};{a:.5f};{t:.3f}" for k, (t, a) in enumerate(zip(TIME, ANGLE)))
     path.write_text(f"Time - Plot 0;Amplitude - Plot 0;\n{rows}\n")
     assert inventory(path).clock.column == ""
+
+
+def test_a_table_that_is_one_array_without_names_has_its_drive_among_its_columns(tmp_path):
+    rng = np.random.default_rng(2)
+    duty = np.repeat(rng.uniform(-1.0, 1.0, 30), N // 10)
+    speed = np.zeros(len(duty))
+    for k in range(1, len(duty)):
+        speed[k] = speed[k - 1] + 0.1 * (10.0 * duty[k - 1] - speed[k - 1])
+    table = np.column_stack([np.arange(len(duty)), 0.01 * np.cumsum(speed), speed, duty])
+    savemat(tmp_path / "motor.mat", {"log": table})
+    begun = start([tmp_path / "motor.mat"], rate=100.0)
+    roles = {role: choice.recorded.column for role, choice in begun.guess.roles.choices.items()}
+    assert roles == {"output": "log[1]", "velocity": "log[2]", "input": "log[3]"}
+    assert "log[0]: counts the rows" in begun.guess.inventory.left_out

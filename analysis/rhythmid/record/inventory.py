@@ -195,7 +195,8 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
             heading.name, time, value * heading.scale, column=name, unit=heading.unit, scale=heading.scale,
             written_unit=heading.written, sign_bit=sign_bit,
         )  # fmt: skip
-        if COUNTER.fullmatch(heading.name) and np.ptp(np.diff(value)) == 0.0:
+        step = np.diff(value)
+        if len(step) and np.ptp(step) == 0.0 and (COUNTER.fullmatch(heading.name) or step[0] == 1.0):
             left.append(f"{name}: counts the rows")
         elif not np.isfinite(value).any() or np.nanmax(value) == np.nanmin(value):
             left.append(f"{name}: never changes")

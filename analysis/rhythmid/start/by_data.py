@@ -81,7 +81,8 @@ def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[C
 
 def by_data(one: Known, output: Recorded, measured: Quantity, velocity: Choice | None) -> Known:
     """The quantity of a command whose name does not state it: that of the closest motion."""
-    if one.quantity is not None or is_counted(one.one) or of_one_array(one.one, output):
+    table = velocity is not None and of_one_array(velocity.recorded, output)  # of several quantities
+    if one.quantity is not None or is_counted(one.one) or (of_one_array(one.one, output) and not table):
         return one
     targets: list[tuple[Quantity, Recorded]] = [(measured, output)]
     if velocity is not None:
