@@ -74,6 +74,14 @@ def test_a_lightly_damped_swing_with_friction_is_scored_in_free_run_over_sixty_p
     assert found[0].kind == "free_run" and found[0].reason == FREE_RUN
 
 
+def test_a_swing_that_nothing_drives_is_scored_in_free_run_however_its_phase_drifts():
+    machine = pendulum(damping=0.014).with_element(CATALOGUE["quadratic_drag"], {"coefficient": 0.0055})
+    series = prepare([motion(machine, (1.3, 0.0), 50.0, 1e-3)])
+    nominal = pendulum(damping=0.0)
+    (found,) = settle(nominal, series, [], CATALOGUE)
+    assert not forgets(nominal, series) and (found.kind, found.reason) == ("free_run", FREE_RUN)
+
+
 def test_the_free_run_of_an_unstable_machine_means_nothing():
     up = pendulum(reference=np.pi, damping=0.5)
     assert not forgets(up, prepare([motion(up, (1e-3, 0.0), 2.0, 1e-5)]))
