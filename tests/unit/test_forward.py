@@ -71,7 +71,7 @@ def found(
         "one_round": one_round, "run_trials": run_trials, "whole_fit": fitted, "under_noise": by_criterion,
         "near_under_noise": by_criterion, "in_best_order": lambda trial, *_: trial, "noise_of": lambda *_: QUIET,
         "eliminate": lambda best, *_: (best, {}), "felt_starts": lambda *_: None, "start_cost": lambda _: 0.0,
-        "under": lambda fit, *_: fit, "not_tried": lambda *_: [], "_could_pay": lambda *_: True,
+        "under": lambda fit, *_: fit, "not_tried": lambda *_: [], "could_pay": lambda *_: True,
         "Origin": SimpleNamespace(of=lambda trial: None), "fine_enough": lambda run, *_: run,
         "reach_of": lambda *_: np.inf,
     }  # fmt: skip

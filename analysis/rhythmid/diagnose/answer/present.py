@@ -24,7 +24,8 @@ from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.diagnosis import Answer
 from rhythmid.diagnose.free_run import FreeRunResult
 from rhythmid.diagnose.location import Dependence
-from rhythmid.diagnose.search.forward import LEVEL, Search
+from rhythmid.diagnose.search.forward import Search
+from rhythmid.diagnose.search.round import LEVEL
 from rhythmid.elements.element import Element
 from rhythmid.errors import InputError
 from rhythmid.identify.admissible import admissible

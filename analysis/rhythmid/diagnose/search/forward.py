@@ -5,7 +5,6 @@ best one if the gain justifies its parameters. Backward elimination then tests e
 by a simpler member of its family or, where there are several effects, by another candidate.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.case import SEARCHED, Budget, Untried
-from rhythmid.diagnose.constants import PRACTICAL
 from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
 from rhythmid.diagnose.search.proposals import (
@@ -24,6 +22,7 @@ from rhythmid.diagnose.search.proposals import (
     better_of,
     follows_all,
     from_given,
+    pair_proposals,
     proposals,
     refitted,
 )
@@ -36,9 +35,9 @@ from rhythmid.diagnose.search.refit import (
     whole_fit,
 )
 from rhythmid.diagnose.search.restoring_force import restoring_force
-from rhythmid.diagnose.search.round import Round, distinct, not_tried, one_round
+from rhythmid.diagnose.search.round import Round, could_pay, distinct, not_tried, one_round
 from rhythmid.diagnose.search.score_tests import under
-from rhythmid.diagnose.search.trial import Origin, Trial
+from rhythmid.diagnose.search.trial import Origin, Trial, contenders
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise, noise_of
@@ -53,7 +52,6 @@ from rhythmid.progress import Tell
 Array = NDArray[np.float64]
 
 SHARE = 5e-4  # share of the gain so far below which a further effect counts as an imperfection of the others
-LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
 GROUPS = 3  # groups of elements that are refitted in turn for the first effect until one improves the fit
 # difference of the criterion within which models are compared again under the noise that they leave, absolute and as a share of the
 # best one's gain. A noise model coloured by the missing effect can rank a surrogate first by as much (Silverbox: a ripple before the
@@ -61,9 +59,7 @@ GROUPS = 3  # groups of elements that are refitted in turn for the first effect 
 NEAR, NEAR_SHARE = 60.0, 0.01
 # gain in the criterion from which further models are examined if the better ones fail under their noise, and their number
 PLAIN, SECOND = 100.0, 2
-UNDERSTATED = 0.1  # smallest ratio of a score to the gain of the refit, far from the first guess
 EFFECTS_AT_ONCE = 3  # largest number of effects
-RIVALS_COMPARED = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise left by the best model of the previous one
 
 
@@ -98,6 +94,7 @@ class _Task:
     pool: ThreadPoolExecutor | None
     tell: Tell
     floor: float
+    most: int
 
     @property
     def step(self) -> float:
@@ -187,14 +184,13 @@ def _searched(
     tell("scoring the catalogue")
     first, nominal = one_round(nominal, (), catalogue, pool)
     floor = 1e-9 * max(float(np.std(one.averaged)) for one in series)
-    task = _Task(series, nominal, given, catalogue, pool, tell, floor)
+    task = _Task(series, nominal, given, catalogue, pool, tell, floor, most)
     state, ended = _begun(task, first), False
-    while len(state.best.added) < most and _could_pay(state):
+    while len(state.best.added) < most and could_pay(state.rounds[-1], state.current, state.margin):
         if budget.spent:
             state, ended = state.without(_cut_off(state)), True
             break
-        state, found = _refitted(task, state)
-        state, grant = _granted(task, state, found)
+        state, grant = _further(task, state)
         if grant is None:
             break
         state = _with_effect(task, state, grant, last=len(grant.winner.added) >= most)
@@ -234,6 +230,18 @@ def _cut_off(state: _State) -> list[Untried]:
     return [Untried(one.element.name, SPENT) for one, _ in distinct(last.scores, REFITTED)]
 
 
+def _further(task: _Task, state: _State) -> tuple[_State, _Grant | None]:
+    """A model with one more effect, or with two that hide each other; None if none is accepted."""
+    state, found = _refitted(task, state)
+    # once the best one is accepted, the next round finds what is missing beside it
+    state, pairs = _paired(task, state, found, found[0].names[-1] if found else "")
+    state, grant = _granted(task, state, better_of([*found, *pairs]))
+    if grant is None:
+        state, pairs = _paired(task, state, [*found, *pairs], "")
+        state, grant = _granted(task, state, pairs)
+    return state, grant
+
+
 def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
     """Refit the models proposed by the last round; returns those that improve on the best so far, best first."""
     here, now = state.here, replace(state.rounds[-1], added=state.here.added)
@@ -260,6 +268,24 @@ def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
     # a richer model with a worse fit has ended in a bad minimum
     found = [one for one in found if one.chi2 < here.chi2]
     return state.without(failed).with_trials(found), found
+
+
+def _paired(task: _Task, state: _State, found: Sequence[Trial], known: str) -> tuple[_State, list[Trial]]:
+    """Refit pairs of elements that promise more than all models `found`; those that improve on the best so far, best first.
+
+    If an element `known` is given, the pairs also promise more than any with it.
+    """
+    here, now = state.here, replace(state.rounds[-1], added=state.here.added)
+    if len(here.added) + 2 > task.most:
+        return state, []
+    gained = max((here.bic() - one.bic() for one in found), default=0.0)
+    proposed = [one for one in pair_proposals(here, now, gained, known) if one.key not in state.trials]
+    if not proposed:
+        return state, []
+    task.tell(f"refitting with {', '.join(' + '.join(one.added[-2:]) for one in proposed)}")
+    made, failed = run_trials(proposed, task.series, Origin.of(here), here.noise, task.step, tell=task.tell)
+    made = [one for one in made if one.chi2 < here.chi2]
+    return state.without(failed).with_trials(made), made
 
 
 def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State, _Grant | None]:
@@ -311,7 +337,8 @@ def _with_effect(task: _Task, state: _State, grant: _Grant, last: bool) -> _Stat
     """The state with one more effect, and with the next round scored unless it is the last one."""
     best = in_best_order(grant.winner, task.series, grant.noise, task.step)
     gained = state.gained + grant.gain + grant.winner.chi2 - best.chi2
-    task.tell(f"{best.added[-1]} explains it better by {grant.gain:.0f}; looking for more")
+    new = " and ".join(label for label in best.added if label not in state.best.added)
+    task.tell(f"{new} explains it better by {grant.gain:.0f}; looking for more")
     current = whole_fit(best, task.series, grant.noise, task.step, pool=task.pool)
     state = replace(state.with_trials([best]), best=best, current=current, noise=grant.noise, gained=gained)
     if last or time_is_up():
@@ -338,7 +365,7 @@ def _reduced(task: _Task, state: _State) -> _State:
 def _ranked(task: _Task, state: _State) -> tuple[Trial, NoiseModel, list[Trial]]:
     """The best model when all are compared under the noise that it leaves, that noise model, and all models, best first."""
     best, noise, step = state.best, state.noise, task.step
-    ranked = _contenders(state.trials, best)
+    ranked = contenders(state.trials, best)
     for turn in range(OVERTAKEN + 1):
         ranked = near_under_noise(ranked, task.series, noise, step, NEAR)
         best = next(one for one in ranked if one.key == best.key)
@@ -365,33 +392,3 @@ def _most_likely(
 
     found = {index: std for index, std in fork_map(left, near) if not isinstance(std, Exception)}
     return near[min(found, key=lambda index: (found[index], index), default=0)]
-
-
-def _could_pay(state: _State) -> bool:
-    """Whether a further effect could be accepted.
-
-    The best score of the last round must be significant. It must also be of the order that an element has to gain and that an
-    effect of practical size has, taking into account that a score can understate the gain of a refit.
-    """
-    now, series, noise = state.rounds[-1], state.current.run.series, state.current.noise
-    if now.chance >= LEVEL or state.current.nrmse() ** 2 < UNDERSTATED * PRACTICAL**2:
-        return False
-    # number of samples times the mean square of the motion
-    power = sum(one.power(one.used) for one in series)
-    practical = PRACTICAL**2 * power / max(noise.variance, noise.long_run_variance)
-    earned = 0.5 * (state.margin + math.log(max(state.best.samples, 2)))
-    return now.strongest > max(earned, UNDERSTATED * practical)
-
-
-def _contenders(trials: Mapping[tuple[str, ...], Trial], best: Trial) -> list[Trial]:
-    """The models to compare at the end, against which each effect's contribution is judged.
-
-    They are the nominal model, the best of each number of effects, and the chosen model with its effects left out.
-    """
-    ranked = sorted(trials.values(), key=lambda t: t.bic())
-    kept = {t.key: t for t in [trials[()], best]}
-    for count in {len(t.added) for t in ranked if t.added}:
-        same = [t for t in ranked if len(t.added) == count][:RIVALS_COMPARED]
-        kept = {t.key: t for t in same} | kept
-    parts = {key: t for key, t in trials.items() if set(key) < set(best.added)}
-    return list((parts | kept).values())

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 # number of elements refitted because of their scores along the whole records, and in windows. In 90 cases of all machines of the
 # proof the right element, or a related law, was among the first four along the records or among the first three in windows
 REFITTED, LOCAL = 4, 3
+PAIRS = 3  # number of pairs that are refitted because of their scores
 # difference of the information criterion below which two models are indistinguishable. A score is linear and a refit is not, so that
 # of elements with such close statistics any may be the missing one
 WORTH = 10.0
@@ -51,6 +52,26 @@ def proposals(
         made.append(propose(base, group[0].element, [one.start for one in group[:2]], now.added, chi2))
         enough.append(-math.inf)
     return made, enough
+
+
+def pair_proposals(here: Trial, now: Round, gained: float, known: str = "") -> list[Proposal]:
+    """Structures to refit with two more elements, if their joint score promises more than the criterion `gained` with one.
+
+    With an element `known` also more than any pair with it: a next round would find those.
+    """
+    reached = max((pair.statistic for pair in now.pairs if known in pair.names), default=0.0)
+    made: list[Proposal] = []
+    for pair in now.pairs:
+        if len(made) == PAIRS or pair.statistic <= reached + WORTH:
+            break
+        first, second = pair.first, pair.second
+        begun = propose(here.model, first.element, [first.start], now.added)
+        own = [pair.own(here.model)]
+        both = propose(begun.model, second.element, [second.start] * 2, begun.added, here.chi2, own)
+        cost = (len(both.model.free) - here.free) * math.log(max(here.samples, 2))
+        if pair.statistic - cost > gained + WORTH:
+            made.append(both)
+    return made
 
 
 def refitted(now: Round, least: int) -> int:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.case import Untried
-from rhythmid.diagnose.constants import OWN_LINE
+from rhythmid.diagnose.constants import OWN_LINE, PRACTICAL
 from rhythmid.diagnose.free_functions import filtered
+from rhythmid.diagnose.search.pair_scores import PairScore, pair_scores, thinned
 from rhythmid.diagnose.search.score_tests import (
     Change,
     Score,
@@ -27,6 +28,7 @@ from rhythmid.diagnose.search.score_tests import (
 from rhythmid.diagnose.shape import own_frequency
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
+from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
 from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
@@ -42,6 +44,8 @@ MISFIT = 0.1  # error, as a share of the motion, from which a residual with auto
 # windows in which the catalogue is scored: enough for all amplitudes, few enough to cost less than the records
 WINDOWS = 40
 MOST_REMOVED = 60  # number of guesses whose effects are removed from a residual before its noise is estimated
+LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
+UNDERSTATED = 0.1  # smallest ratio of a score to the gain of the refit, far from the first guess
 REMEMBERED = 4  # minimum length of a window, in correlation times of the noise
 
 
@@ -56,12 +60,14 @@ class Round:
     added : labels of the effects in the scored model.
     local : scores in short windows, best first. A score is linear in the missing effect. Along a whole record a missing force
         accumulates a phase error, which is nonlinear; in a short window this error stays small.
+    pairs : scores of pairs of elements along the whole records, best first.
     """
 
     scores: tuple[Score, ...]
     p_value: float
     added: tuple[str, ...] = ()
     local: tuple[Score, ...] = ()
+    pairs: tuple[PairScore, ...] = ()
 
     @property
     def chance(self) -> float:
@@ -76,6 +82,22 @@ class Round:
     def strongest(self) -> float:
         """The largest statistic of all scores; 0 without any."""
         return max((group[0].statistic for group in (self.scores, self.local) if group), default=0.0)
+
+
+def could_pay(now: Round, fit: Fit, margin: float) -> bool:
+    """Whether a further effect beside those of a fit could be accepted, if it has to gain this `margin` of the criterion.
+
+    The best score of its round must be significant. It must also be of the order that an element has to gain and that an
+    effect of practical size has, taking into account that a score can understate the gain of a refit.
+    """
+    series, noise = fit.run.series, fit.noise
+    if now.chance >= LEVEL or fit.nrmse() ** 2 < UNDERSTATED * PRACTICAL**2:
+        return False
+    # number of samples times the mean square of the motion
+    power = sum(one.power(one.used) for one in series)
+    practical = PRACTICAL**2 * power / max(noise.variance, noise.long_run_variance)
+    earned = 0.5 * (margin + math.log(max(fit.samples, 2)))
+    return now.strongest > max(earned, UNDERSTATED * practical)
 
 
 def distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Score]]]:
@@ -132,19 +154,21 @@ def one_round(
         noise = NoiseModel(np.empty(0), noise.variance**0.5)
     give_back()
     fit = under(fit, noise, pool)
-    scores, local = score(fit, changes_at(fit, catalogue, pool)), scored_in_windows(fit, catalogue, pool)
-    scores, local = (_separable(some, fit) for some in (scores, local))
-    return Round(tuple(scores), p_value(scores), added, tuple(local)), fit
+    tested = sorted(thinned(fit, changes_at(fit, catalogue, pool)), key=lambda pair: -pair[0].statistic)
+    local, sizes = scored_in_windows(fit, catalogue, pool), scales(fit.run.series, fit.model)
+    tested = [pair for pair in tested if _separable(pair[0], sizes)]
+    scores, pairs = [one for one, _ in tested], pair_scores(fit, tested)
+    local = tuple(one for one in local if _separable(one, sizes))
+    return Round(tuple(scores), p_value(scores), added, local, tuple(pairs)), fit
 
 
-def _separable(scores: Sequence[Score], fit: Fit) -> list[Score]:
-    """The scores without those of vibrations at the motion's own frequency.
+def _separable(one: Score, sizes: Scales) -> bool:
+    """Whether a score is not of a vibration at the motion's own frequency.
 
     Such a vibration stands for any change in the path of the force. It explains much of whatever is missing, but is never a cause that the
     records show, and beside it the missing effect is hardly needed.
     """
-    sizes = scales(fit.run.series, fit.model)
-    return [one for one in scores if own_frequency(one.element, one.values, sizes) >= OWN_LINE]
+    return own_frequency(one.element, one.values, sizes) >= OWN_LINE
 
 
 def changes_at(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> Iterator[Change]:

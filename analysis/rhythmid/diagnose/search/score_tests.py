@@ -298,17 +298,26 @@ def _kept(outputs: Sequence[Array]) -> tuple[Array, ...]:
 
 def score(fit: Fit, changes: Iterable[Change]) -> list[Score]:
     """Scores of all changes under the fit's noise model, best first."""
-    return sorted((one for one, _ in scored(fit, changes)), key=lambda s: -s.statistic)
+    return sorted((one for one, _, _ in scored(fit, changes)), key=lambda s: -s.statistic)
 
 
 def best_changes(fit: Fit, changes: Iterable[Change], count: int) -> list[Change]:
     """The `count` changes with the best scores under the fit's noise model, best first; no others are stored meanwhile."""
-    best = heapq.nlargest(count, scored(fit, changes), key=lambda pair: pair[0].statistic)
-    return [change for _, change in best]
+    best = heapq.nlargest(count, scored(fit, changes), key=lambda found: found[0].statistic)
+    return [change for _, change, _ in best]
 
 
-def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change]]:
-    """Changes with their scores under the fit's noise model, without those that the nominal parameters can reproduce."""
+def unexplained(fit: Fit) -> Array:
+    """The whitened residual (n,) of a fit without its part along the effects of the free parameters."""
+    left, _ = parameter_basis(fit)
+    return fit.linearisation.residual - left @ (left.T @ fit.linearisation.residual)
+
+
+def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change, Array]]:
+    """Changes with their scores under the fit's noise model, and the whitened part (n,) that the free parameters cannot reproduce.
+
+    Changes that these can reproduce are left out.
+    """
     left, made_by = parameter_basis(fit)
     residual = fit.linearisation.residual
     residual = residual - left @ (left.T @ residual)
@@ -330,7 +339,7 @@ def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change]
             statistic = 0.0
         proportional = one.element.size and math.isfinite(one.element.absent)
         beside = dict(zip(fit.names, -made_by @ (left.T @ joined))) if proportional else {}
-        yield Score(one.element, one.values, statistic, size, beside), one
+        yield Score(one.element, one.values, statistic, size, beside), one, change
 
 
 def under(fit: Fit, noise: NoiseModel, pool: ThreadPoolExecutor | None = None) -> Fit:

@@ -16,6 +16,7 @@ from rhythmid.model import Model
 from rhythmid.simulation.compiled import compile_model
 
 Array = NDArray[np.float64]
+RIVALS_COMPARED = 4  # models of each number of effects that are compared at the end of a search
 FAINTER = (0.1, 0.01)  # shares of a guess that are tried where the guess itself does not help
 
 
@@ -173,3 +174,17 @@ def propose(
     own = [*beside, *({} for _ in guesses[len(beside) :])]
     begun = tuple(named(guess) | values for guess, values in zip(guesses, own, strict=True))
     return Proposal((*added, label), extended, begun, ceiling, tuple(map(named, faint)))
+
+
+def contenders(trials: Mapping[tuple[str, ...], Trial], best: Trial) -> list[Trial]:
+    """The models to compare at the end, against which each effect's contribution is judged.
+
+    They are the nominal model, the best of each number of effects, and the chosen model with its effects left out.
+    """
+    ranked = sorted(trials.values(), key=lambda t: t.bic())
+    kept = {t.key: t for t in [trials[()], best]}
+    for count in {len(t.added) for t in ranked if t.added}:
+        same = [t for t in ranked if len(t.added) == count][:RIVALS_COMPARED]
+        kept = {t.key: t for t in same} | kept
+    parts = {key: t for key, t in trials.items() if set(key) < set(best.added)}
+    return list((parts | kept).values())
