@@ -38,6 +38,18 @@ class PairScore:
         """Names of the two elements."""
         return self.first.element.name, self.second.element.name
 
+    @property
+    def families(self) -> tuple[str, ...]:
+        """Families of the two elements in alphabetical order; the name of an element without one."""
+        both = self.first.element, self.second.element
+        return tuple(sorted(one.family or one.name for one in both))
+
+    @property
+    def free(self) -> int:
+        """Number of free parameters of the two elements."""
+        both = self.first.element, self.second.element
+        return sum(not parameter.fixed for one in both for parameter in one.parameters)
+
     def own(self, model: Model) -> dict[str, float]:
         """Values of the model's own parameters beside both first guesses, within their bounds."""
         once = self.first.own(model)

@@ -55,23 +55,24 @@ def proposals(
 
 
 def pair_proposals(here: Trial, now: Round, gained: float, known: str = "") -> list[Proposal]:
-    """Structures to refit with two more elements, if their joint score promises more than the criterion `gained` with one.
+    """Structures to refit with two more elements, if by their joint score the criterion improves by more than what one has `gained`.
 
-    With an element `known` also more than any pair with it: a next round would find those.
+    With an element `known` also by more than with any pair with it: a next round would find those. Of pairs of the same two families the best one
+    is taken, because related laws are compared later.
     """
-    reached = max((pair.statistic for pair in now.pairs if known in pair.names), default=0.0)
-    made: list[Proposal] = []
-    for pair in now.pairs:
-        if len(made) == PAIRS or pair.statistic <= reached + WORTH:
+    cost = math.log(max(here.samples, 2))
+    promise = [(pair.statistic - cost * pair.free, pair) for pair in now.pairs]
+    reached = max((gain for gain, pair in promise if known in pair.names), default=0.0)
+    made: dict[tuple[str, ...], Proposal] = {}
+    for gain, pair in sorted(promise, key=lambda one: -one[0]):
+        if len(made) == PAIRS or gain <= max(gained, reached) + WORTH:
             break
-        first, second = pair.first, pair.second
-        begun = propose(here.model, first.element, [first.start], now.added)
-        own = [pair.own(here.model)]
-        both = propose(begun.model, second.element, [second.start] * 2, begun.added, here.chi2, own)
-        cost = (len(both.model.free) - here.free) * math.log(max(here.samples, 2))
-        if pair.statistic - cost > gained + WORTH:
-            made.append(both)
-    return made
+        if pair.families not in made:
+            first, second = pair.first, pair.second
+            begun = propose(here.model, first.element, [first.start], now.added)
+            starts, own = [second.start] * 2, [pair.own(here.model)]
+            made[pair.families] = propose(begun.model, second.element, starts, begun.added, here.chi2, own)
+    return list(made.values())
 
 
 def refitted(now: Round, least: int) -> int:
