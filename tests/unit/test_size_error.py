@@ -91,3 +91,10 @@ def test_what_has_widened_an_interval_remains_beside_other_effects():
     )
     assert wide[names[0]] == pytest.approx(3.0 * narrow[names[0]])
     assert math.isinf(wide[names[1]])
+
+
+def test_a_parameter_on_which_no_residual_depends_stays_open_beside_other_effects():
+    names = ["quadratic_drag.coefficient", "second_mode.mass"]
+    jacobian = np.stack([DRAG, 0.0 * DRAG], axis=1)
+    found = std_beside_others(["second_mode"], dict(zip(names, (1.0, math.inf))), jacobian, [None, None])
+    assert math.isinf(found[names[1]])

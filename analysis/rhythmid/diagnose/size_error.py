@@ -78,6 +78,7 @@ def std_beside_others(
         beside = np.diag(covariance_of(jacobian[:, kept], [priors[place] for place in kept]))
         for place, variance in zip(kept, beside, strict=True):
             if effects[place] == label:
-                ratio = math.sqrt(min(variance / together[place], 1.0)) if together[place] > 0.0 else 1.0
+                told = 0.0 < together[place] < math.inf  # else the records do not determine it
+                ratio = math.sqrt(min(variance / together[place], 1.0)) if told else 1.0
                 found[names[place]] = std[names[place]] * ratio
     return found
