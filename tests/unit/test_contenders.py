@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, SHORT, hopper, records, search_of
+from rhythmid.diagnose.constants import EDGE
 from rhythmid.diagnose.contenders import (
     Rows,
     contend,
@@ -19,6 +20,7 @@ from rhythmid.diagnose.contenders import (
 from rhythmid.diagnose.evidence import difference
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
+from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series, hold_out_tail, prepare
 from rhythmid.model import Model
 from rhythmid.value import Prior
@@ -113,11 +115,11 @@ def test_the_true_effect_predicts_what_no_fit_has_seen_and_its_shape_is_looked_a
 ):
     rows = rows_of(given, separate, NOISE)
     found = contest(given, rows, plain, rubbing)
-    nominal, friction = hypotheses_of(found, rows, lambda trial: {"within_bounds": float(len(trial.added))})
+    nominal, friction = hypotheses_of(found, rows, scales(given, plain.model))
     gain, error = difference(friction.prediction, nominal.prediction)
     assert gain > 10.0 * error > 0.0
     assert friction.elements == friction.names == ("coulomb_friction",) and nominal.kind == "nominal"
-    assert friction.shape == {"within_bounds": 1.0} and nominal.shape == {}
+    assert friction.shape["within_bounds"] > EDGE and nominal.shape == {}
     assert friction.heldout_nrmse < 0.5 * nominal.heldout_nrmse
     assert len(friction.prediction.log_density) == rows.blocks.count
 

@@ -14,7 +14,7 @@ from rhythmid.diagnose.constants import PRACTICAL
 from rhythmid.diagnose.replay import contest_of, decision_of, ledger, redecide
 
 NOMINAL = supposed("", predicted(1.0))
-SHAPES = st.sampled_from([None, {"within_bounds": 0.0}, {"within_bounds": math.inf, "own_frequency": 3.0}])
+SHAPES = st.sampled_from([None, {"within_bounds": 0.0}, {"within_bounds": math.inf, "more_than_gain": 3.0}])
 KINDS = st.sampled_from(["effects", "effects", "freed_value", "location", "free_map"])
 
 

@@ -40,10 +40,10 @@ def test_a_place_that_is_not_granted_ends_the_growth_and_larger_hypotheses_are_s
 
 
 def test_what_has_lost_its_shape_leaves_its_place_to_the_next_best():
-    lost = supposed("play", predicted(0.05), shape={"acts_within_records": 0.0})
+    lost = supposed("play", predicted(0.05), shape={"within_bounds": 0.0})
     found = select(contest(NOMINAL, lost, FRICTION))
     assert found.chosen is FRICTION
-    assert [row.name for row in found.rejections if row.hypothesis == ("play",)] == ["acts_within_records"]
+    assert [row.name for row in found.rejections if row.hypothesis == ("play",)] == ["within_bounds"]
 
 
 @pytest.mark.parametrize("kind", ["freed_value", "delay", "location", "free_map"])

@@ -53,13 +53,6 @@ EQUIVALENT = 2.0
 
 # share of a bound, or of an effect, within which a value counts as being there: rounding of a descent that stopped at it
 EDGE = 1e-3
-# frequency resolutions within which an effect's frequency counts as equal to a multiple of the forcing's, or to that of a free
-# motion: spectral lines closer than their width cannot be separated
-OWN_LINE = 1.0
-# for an effect that changes with time: share of its action beyond the nominal model that no free map of the motion reproduces.
-# Friction by direction mistaken for a fading actuator has 0.004 and less where the motion is made once; any effect has 0.13 and
-# more where the motion is repeated
-RECURS = 0.05
 
 # --- what a verdict needs -------------------------------------------------------------------------------------------
 # joint probability from which names are stated
@@ -67,7 +60,7 @@ STATED = 0.8
 # share of all that free maps and names together explain that the names must explain, for the names to be stated
 EXPLAINED_BY_NAMES = 0.8
 # more than half: share of the mismatch from which names explain the main part of it; of an actuator's action, from which it is more than a
-# gain; of the effort that an actuator's effect has to leave to move the machine; and of the measurement that a model may miss in a
+# gain; and of the measurement that a model may miss in a
 # predictable way (from the residual's own past), beyond which it describes another machine
 MAINLY = 0.5
 # chance that the catalogue holds the truth, as a function of the unexplained share of the explainable mismatch: one half at
@@ -133,6 +126,3 @@ SERIES = 3
 # periods of the motion up to which an input delay is sought: a delay of half a period looks like a change of sign, so that a longer
 # one is another minimum of the same fit
 LONGEST_DELAY = 0.25
-# times the range of the motion. REACH: the effect must be curved within it (the motion and a signal before clipping stay within
-# it). FAR_RANGES: every kink shows within it
-REACH, FAR_RANGES = 1.2, 1e3

@@ -5,7 +5,7 @@ it did not see are the hidden ends of the same records, or separate records.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,8 @@ from rhythmid.diagnose.evidence import (
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind
 from rhythmid.diagnose.search.refit import whole_fit
 from rhythmid.diagnose.search.trial import Trial
+from rhythmid.diagnose.shape import shape_of
+from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, rerun
@@ -33,7 +35,6 @@ from rhythmid.parallel import fork_map
 from rhythmid.progress import Tell, counted, silent
 
 Array = NDArray[np.float64]
-Shape = Callable[[Trial], Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -248,8 +249,8 @@ def _by_size(trials: Sequence[tuple[Trial, Kind]]) -> dict[int, list[Trial]]:
     return found
 
 
-def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> list[Hypothesis]:
-    """Convert the contenders to hypotheses, using the autocorrelation time of the one that predicts best."""
+def hypotheses_of(contenders: Sequence[Contender], rows: Rows, sizes: Scales) -> list[Hypothesis]:
+    """Convert the contenders to hypotheses, using the autocorrelation time of the one that predicts best; `sizes` are the records'."""
     time = remembered(contenders, rows)
     return [
         Hypothesis.of(
@@ -259,7 +260,7 @@ def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> 
             one.trial.free,
             prediction(one.found, rows.blocks, time, one.error),
             heldout_error(one.error, rows),
-            shape(one.trial) if one.kind == "effects" else {},
+            shape_of(one.trial.model, one.trial.added, sizes) if one.kind == "effects" else {},
             one.values,
         )
         for one in contenders

@@ -37,7 +37,6 @@ from rhythmid.diagnose.search.score_tests import (
 )
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest, Selection, select
-from rhythmid.diagnose.shape import shape_of
 from rhythmid.diagnose.size_error import size_errors, std_beside_others
 from rhythmid.diagnose.small_effects import small_effects
 from rhythmid.diagnose.tick_interval import ticks_followed
@@ -96,11 +95,8 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     case.tell("weighing the hypotheses on data that no fit has seen")
     weighing = _Weighing(case, calibration, known, found, rows_of(series, unseen, found.noise))
     contenders = weighing.contenders([(t, "effects" if t.added else "nominal") for t in found.trials])
-    run = trajectories(found.fit)
-    trial = _trial_of(select(weighing.contest(contenders, run)).chosen, contenders)
-    if trial.key != found.best.key:
-        run = weighing.run_of(trial)
-    trial, run, contenders, uncompared = weighing.with_other_kinds(trial, run, contenders)
+    trial = _trial_of(select(weighing.contest(contenders)).chosen, contenders)
+    trial, run, contenders, uncompared = weighing.with_other_kinds(trial, contenders)
     case.tell("locating what is left")
     began = time.monotonic()
     after = before = dependences(run, weighing.rows, case.pool)
@@ -108,7 +104,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     if trial.added:
         before, refitted = weighing.of_the_nominal_model(contenders, time.monotonic() - began)
     maps = weighing.maps(after, refitted, contenders)
-    contest = weighing.contest(contenders, run, maps, uncompared)
+    contest = weighing.contest(contenders, maps, uncompared)
     selection = select(contest)
     if selection.chosen.key != trial.key:
         trial = _trial_of(selection.chosen, contenders)
@@ -184,23 +180,21 @@ class _Weighing:
 
     def run_of(self, trial: Trial) -> Trajectories:
         """The run of a trial, fitted under the search's noise."""
-        return trajectories(whole_fit(trial, self.series, self.found.noise, self.step, pool=self.case.pool))
+        found = self.found
+        if trial.key == found.best.key:
+            return trajectories(found.fit)
+        return trajectories(whole_fit(trial, self.series, found.noise, self.step, pool=self.case.pool))
 
     def contest(
         self,
         contenders: Sequence[Contender],
-        run: Trajectories,
         maps: Mapping[str, Prediction] | None = None,
         uncompared: bool = False,
     ) -> Contest:
-        """The contest of these contenders, whose effects are judged along a `run`, and of free `maps`."""
-        found, sizes = self.found, scales(self.series, self.found.fit.model)
-
-        def shape(trial: Trial) -> dict[str, float]:
-            return shape_of(trial.model, trial.added, run, sizes)
-
+        """The contest of these contenders and of free `maps`."""
+        found = self.found
         return Contest(
-            tuple(hypotheses_of(contenders, self.rows, shape)),
+            tuple(hypotheses_of(contenders, self.rows, scales(self.series, found.fit.model))),
             maps or {},
             len({score.element.name for one in found.rounds for score in one.scores}),
             self.rows.size,
@@ -214,18 +208,18 @@ class _Weighing:
         )
 
     def with_other_kinds(
-        self, chosen: Trial, run: Trajectories, contenders: list[Contender]
+        self, chosen: Trial, contenders: list[Contender]
     ) -> tuple[Trial, Trajectories, list[Contender], bool]:
         """The chosen trial, its run, and the contenders with those of other kinds; whether the budget ended before all were compared.
 
         If a related law takes the place of an effect, the laws related to the others are tried beside it: with two wrong laws,
         exchanging only one of them may not pay.
         """
-        uncompared = False
+        uncompared, run = False, self.run_of(chosen)
         for _ in range(EFFECTS_AT_ONCE):
             more, uncompared = self.of_other_kinds(chosen, run, contenders)
             contenders = [*contenders, *more]
-            best = select(self.contest(contenders, run)).chosen
+            best = select(self.contest(contenders)).chosen
             if uncompared or best.kind != "effects" or best.key == chosen.key:
                 break
             chosen = _trial_of(best, contenders)

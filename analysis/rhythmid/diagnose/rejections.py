@@ -17,8 +17,6 @@ from rhythmid.diagnose.constants import (
     FALSE_ALARM,
     MAINLY,
     MISMATCH,
-    OWN_LINE,
-    RECURS,
     REST,
     RICHER,
 )
@@ -124,11 +122,7 @@ AT_END = "within_bounds"  # the shape of a law whose parameters are inside its r
 # lower limits of statistics of the fitted effects themselves; a hypothesis below one of them does not compete
 SHAPES: Mapping[str, float] = {
     AT_END: EDGE,
-    "acts_within_records": EDGE,
-    "own_frequency": OWN_LINE,
-    "moves_the_machine": MAINLY,
     "more_than_gain": MAINLY,
-    "more_than_motion": RECURS,
 }
 
 
@@ -216,31 +210,10 @@ RULES: tuple[Rule, ...] = (
         "only a limit of its parameters is identifiable, where it is another effect",
     ),
     _shape_rule(
-        "acts_within_records",
-        "whether the effect's law is nonlinear within the recorded motion (infinite), or only outside it (0)",
-        "it would act only outside the range of the recorded motion",
-    ),
-    _shape_rule(
-        "own_frequency",
-        "distance of the effect's frequency from a multiple of the forcing's, or from that of a free motion, in resolved spectral lines",
-        "at a multiple of the forcing's frequency, or at that of a free motion, it is indistinguishable from a change in the path of the force",
-    ),
-    _shape_rule(
-        "moves_the_machine",
-        "share of the effort that an actuator's effect leaves to move the machine",
-        "an actuator's effect that removes most of the effort cannot explain the motion",
-    ),
-    _shape_rule(
         "more_than_gain",
         "mean square of what an actuator's law does to the recorded effort beyond a gain, as a share of what it does to the effort that "
         "the model requires",
         "on the recorded effort it is mainly a gain, which inertia and forces contain already",
-    ),
-    _shape_rule(
-        "more_than_motion",
-        "mean square of what an effect that changes with time does to the effort beyond any free map of the motion, as a share of what it does "
-        "beyond the nominal model's parameters",
-        "the motion comes too few times for a change with time to be told from a law of the motion",
     ),
 )
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,8 +104,3 @@ def kind_of(elements: Sequence[str], model: Model) -> Kind:
     if INPUT_DELAY in elements:
         return "delay"
     return "effects" if all(model.term(label) is not None for label in elements) else "freed_value"
-
-
-def worst(*shapes: Mapping[str, float]) -> dict[str, float]:
-    """The smallest value of each statistic."""
-    return {name: min(one[name] for one in shapes if name in one) for name in dict.fromkeys(chain(*shapes))}

@@ -16,7 +16,6 @@ from rhythmid.deadline import SPENT, time_is_up, without_deadline
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.effort.beyond_gain import beyond_gain, recorded_efforts
-from rhythmid.diagnose.effort.beyond_motion import beyond_motion
 from rhythmid.diagnose.effort.candidate import (
     Screened,
     Start,
@@ -27,14 +26,14 @@ from rhythmid.diagnose.effort.candidate import (
     starts_of,
     widest,
 )
-from rhythmid.diagnose.effort.fitted import Fitted, kind_of, worst
+from rhythmid.diagnose.effort.fitted import Fitted, kind_of
 from rhythmid.diagnose.effort.kin import at_values_of, contained, kin, represented, shortlist
 from rhythmid.diagnose.effort.reference import Mapped, reference_of
 from rhythmid.diagnose.effort.scales import scales_at, scales_of
 from rhythmid.diagnose.evidence import Blocks, predict
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.rejections import AT_END, SHAPES, Claim, keeps_shape, rejections_of
-from rhythmid.diagnose.shape import within_bounds
+from rhythmid.diagnose.shape import shape_of
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -219,8 +218,7 @@ class _Search:
             model = at_values_of(best, plain)
             if model is not None and not time_is_up():
                 aligned = self._aligned(plain.elements)
-                fit = self._fit(plain.elements, model, plain.priors, aligned, best.fit.alignment)
-                made = replace(fit, shape=worst(plain.shape, fit.shape))
+                made = self._fit(plain.elements, model, plain.priors, aligned, best.fit.alignment)
                 again = self.predicted([*new, made])[-1]
                 found[place] = made if again.score > scores[place] else plain
         return found
@@ -268,13 +266,7 @@ class _Search:
             for name, prior in fitted.priors.items()
             if name != label and not name.startswith(f"{label}.")
         }
-        made = self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
-        shape = dict(made.shape)
-        for one in rest:  # with fewer effects its shape statistics may change
-            term = made.fit.model.term(one)
-            if term is not None:
-                shape = worst(shape, self._shape(made, self.without(made, one), one, term.element))
-        return replace(made, shape=shape)
+        return self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
 
     def reduce(self, fitted: Fitted) -> None:
         """Backward elimination: fit a hypothesis without each of its effects, and with simpler laws in their place.
@@ -332,30 +324,18 @@ class _Search:
             priors |= self._priors(model, label, start.element, alignment)
         if any(not math.isfinite(prior.std) or prior.std <= 0.0 for prior in priors.values()):
             return None
-        made = self._fit((*base.elements, label), model, priors, aligned, alignment)
-        own = self._shape(made, base, label, start.element) if start.element else {}
-        return replace(made, shape=worst(base.shape, made.shape, own))
+        return self._fit((*base.elements, label), model, priors, aligned, alignment)
 
-    def _shape(self, made: Fitted, base: Fitted, label: str, element: Element) -> dict[str, float]:
-        """Statistics of an effect by the name of the rule that uses them; `base` is the hypothesis without it."""
-        model, sizes = made.fit.model, scales_of(self.balance, base.fit.model)
-        own = beyond_motion(self.balance, model, label, self.nominal.linearised, self.reference.linearised)
-        shape = {"more_than_motion": own}
-        if element.slot != "actuator":
-            return shape
-        shape["moves_the_machine"] = self._left(made, base, label)
-        if self.recorded is not None:
+    def _shape(self, model: Model, elements: Sequence[str]) -> dict[str, float]:
+        """Statistics of a fitted model's effects by the name of the rule that uses them."""
+        sizes = scales_of(self.balance, model)
+        shape = shape_of(model, elements, sizes)
+        laws = [one for one in elements if (term := model.term(one)) and term.element.slot == "actuator"]
+        if laws and self.recorded is not None:
             required = np.concatenate(self.balance.required(model))
-            shape["more_than_gain"] = beyond_gain(model, label, sizes, self.recorded, required)
+            gains = (beyond_gain(model, label, sizes, self.recorded, required) for label in laws)
+            shape["more_than_gain"] = min(gains)
         return shape
-
-    def _left(self, made: Fitted, base: Fitted, label: str) -> float:
-        """Share of the effort that remains for moving the machine beside an actuator's effect."""
-        left, before = (
-            float(np.linalg.norm(self.balance.predicted(model, 0.0)))
-            for model in (made.fit.model.pruned(label), base.fit.model)
-        )
-        return left / before if before > 0.0 else math.inf
 
     def _priors(self, model: Model, label: str, element: Element, alignment: float) -> dict[str, Prior]:
         """Priors of an addition: a change of any of its parameters may change the effort by at most the effort's size."""
@@ -378,10 +358,7 @@ class _Search:
     ) -> Fitted:
         fit = fit_effort(self.balance, model, [n for n in model.free if n in priors], priors, aligned, at)
         made = Fitted.of(elements, kind_of(elements, model), fit, priors, self.balance)
-        sizes = scales_of(self.balance, model)
-        terms = [term for label in elements if (term := fit.model.term(label)) is not None]
-        ends = [within_bounds(term, sizes) for term in terms]
-        return replace(made, shape={"within_bounds": min(ends, default=math.inf)})
+        return replace(made, shape=self._shape(fit.model, elements))
 
     def _aligned(self, elements: Sequence[str]) -> Alignment:
         if INPUT_DELAY not in elements:

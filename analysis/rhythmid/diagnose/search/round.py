@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.case import Untried
-from rhythmid.diagnose.constants import OWN_LINE, PRACTICAL
+from rhythmid.diagnose.constants import PRACTICAL
 from rhythmid.diagnose.free_functions import filtered
+from rhythmid.diagnose.search.own_frequency import OWN_LINE, own_frequency
 from rhythmid.diagnose.search.pair_scores import PairScore, pair_scores, thinned
 from rhythmid.diagnose.search.score_tests import (
     Change,
@@ -25,7 +26,6 @@ from rhythmid.diagnose.search.score_tests import (
     trajectories,
     under,
 )
-from rhythmid.diagnose.shape import own_frequency
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Scales

@@ -1,17 +1,13 @@
-"""A change with time is told from a law of the motion only where the motion comes again."""
+"""A change with time and a law of the motion: each is found where it is the true one."""
 
 import math
 
 import numpy as np
-import pytest
 from axes import CATALOGUE, axis_model
 
-from rhythmid.diagnose.effort.beyond_motion import changes_with_time
 from rhythmid.diagnose.effort.search import search_effort
-from rhythmid.diagnose.rejections import keeps_shape
 from rhythmid.record.record import Channel, Record
 
-STEP = 5e-3
 ASYMMETRY = 0.2
 
 
@@ -40,33 +36,16 @@ def stepped(turns: int, friction: float, fade: float = 0.0) -> Record:
     )  # fmt: skip
 
 
-def fades(record: Record) -> tuple[float, bool]:
-    """The statistic of a fading actuator, and whether it is believed to be one."""
+def chosen(record: Record) -> tuple[str, ...]:
+    """The effect that the search chooses among a fading actuator and dry frictions."""
     few = ("actuator_fade", "coulomb_friction", "asymmetric_coulomb_friction")
     known = CATALOGUE.without(*(name for name in CATALOGUE if name not in (*few, "viscous_damper")))
-    found = search_effort([record], axis_model(), known, most=1)
-    both = [one for one in (*found.hypotheses, *found.ruled_out) if one.elements == ("actuator_fade",)]
-    return both[0].shape["more_than_motion"], keeps_shape(both[0].shape)
+    return search_effort([record], axis_model(), known, most=1).chosen.elements
 
 
 def test_friction_by_direction_in_one_turn_is_no_fading_actuator():
-    statistic, kept = fades(stepped(1, 0.8))
-    assert statistic < 0.01 and not kept
+    assert chosen(stepped(1, 0.8)) == ("asymmetric_coulomb_friction",)
 
 
 def test_a_fading_actuator_that_drives_many_turns_is_one():
-    statistic, kept = fades(stepped(8, 0.0, 0.03))
-    assert statistic > 0.2 and kept
-
-
-@pytest.mark.parametrize(
-    ("name", "values", "changes"),
-    [
-        ("actuator_fade", {"rate": 0.01}, True),
-        ("periodic_disturbance", {"amplitude": 1.0, "frequency": 0.3, "phase": 0.0}, True),
-        ("coulomb_friction", {"force": 1.0, "transition": 0.01}, False),
-        ("actuator_lag", {"time_constant": 0.1}, False),
-    ],
-)
-def test_an_effect_changes_with_time_where_its_law_says_so(name, values, changes):
-    assert changes_with_time(CATALOGUE[name], values, axis_model()) is changes
+    assert chosen(stepped(8, 0.0, 0.03)) == ("actuator_fade",)
