@@ -8,9 +8,7 @@ from contests import contest, ends, predicted, supposed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhythmid.diagnose.hypothesis import Hypothesis
-from rhythmid.diagnose.probability import weights_of
-from rhythmid.diagnose.selection import beside_small_effects, equivalent, select, special_case
+from rhythmid.diagnose.selection import equivalent, select, special_case
 
 NOMINAL = supposed("", predicted(1.0))
 FRICTION = supposed("friction", predicted(0.2))
@@ -177,35 +175,3 @@ def test_a_second_effect_that_adds_nothing_to_a_refused_one_is_not_granted_with_
 def test_the_floor_is_the_best_prediction_of_all_free_maps_included():
     assert contest(NOMINAL, FRICTION).floor == pytest.approx(0.2)
     assert contest(NOMINAL, FRICTION, maps={"time": predicted(0.05)}).floor == pytest.approx(0.05)
-
-
-def kin(elements: str, mean_square: float, score: float) -> Hypothesis:
-    """A hypothesis of two laws of stiffness or of hysteresis, or of both."""
-    families = {"cubic": "stiffness", "gravity": "stiffness", "hysteresis": "friction"}
-    return supposed(
-        elements, predicted(mean_square, score), family={one: families[one] for one in elements.split()}
-    )
-
-
-@pytest.mark.parametrize(
-    ("company", "chosen"), [((390.0, 430.0), "gravity"), ((430.0, 390.0), "cubic"), ((), "cubic")]
-)
-def test_kin_compete_beside_the_same_small_effects(company, chosen):
-    alone = [
-        kin("cubic", 1e-3, 300.0),
-        kin("gravity", 1.0001e-3, 280.0),
-    ]  # cubic stands for a part of the hysteresis, too
-    both = [
-        kin(f"{law} hysteresis", 0.9999e-3 - 1e-9 * score, score)
-        for law, score in zip(("cubic", "gravity"), company, strict=False)
-    ]
-    found = select(contest(NOMINAL, *alone, *both))
-    assert found.chosen.elements == (chosen,)
-    weights = weights_of(contest(NOMINAL, *alone, *both), found)
-    assert weights[chosen,] > 0.9
-
-
-def test_what_is_no_kin_of_the_chosen_effect_is_compared_as_it_is():
-    plain, other = kin("cubic", 1e-3, 300.0), kin("hysteresis", 0.5, -500.0)
-    both = kin("cubic hysteresis", 0.9e-3, 400.0)
-    assert beside_small_effects(other, plain, [plain, other, both]) is other

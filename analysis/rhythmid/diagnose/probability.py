@@ -27,7 +27,7 @@ from rhythmid.diagnose.constants import (
 from rhythmid.diagnose.evidence import probabilities
 from rhythmid.diagnose.hypothesis import Hypothesis
 from rhythmid.diagnose.rejections import keeps_shape
-from rhythmid.diagnose.selection import Contest, Selection, beside_small_effects
+from rhythmid.diagnose.selection import Contest, Selection
 
 
 @dataclass(frozen=True)
@@ -115,10 +115,12 @@ class Names:
 def weights_of(contest: Contest, selection: Selection) -> dict[tuple[str, ...], float]:
     """Weight of each hypothesis, by key, among those with no more effects than the chosen one."""
     chosen = selection.chosen
-    sound = [one for one in contest.hypotheses if keeps_shape(one.shape)]
-    rivals = [one for one in sound if len(one.elements) <= len(chosen.elements)]
-    compared = [beside_small_effects(one, chosen, sound) for one in rivals]
-    return {one.key: float(weight) for one, weight in zip(rivals, probabilities(compared))}
+    rivals = [
+        one
+        for one in contest.hypotheses
+        if keeps_shape(one.shape) and len(one.elements) <= len(chosen.elements)
+    ]
+    return {one.key: float(weight) for one, weight in zip(rivals, probabilities(rivals))}
 
 
 def adequacy(explained: float) -> float:

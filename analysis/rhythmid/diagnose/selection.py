@@ -7,7 +7,7 @@ where no rule of the table of rejections rejects the best of them.
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from rhythmid.diagnose.constants import EQUIVALENT, RICHER
 from rhythmid.diagnose.evidence import removed, weight_for
@@ -122,7 +122,6 @@ def select(contest: Contest) -> Selection:
         else:
             # a difference of rounding must not decide
             smaller = max(smaller, sound[0], key=lambda one: round(one.prediction.score, 6))
-    chosen = _beside_others(chosen, contest, {row.hypothesis for row in told})
     return Selection(_in_parts(chosen, contest, told), tuple(told))
 
 
@@ -168,54 +167,6 @@ def _in_parts(chosen: Hypothesis, contest: Contest, told: Sequence[Rejection]) -
             ]
             best = max([best, *found], key=lambda one: one.prediction.score)
     return best
-
-
-def _beside_others(chosen: Hypothesis, contest: Contest, refused: Collection[tuple[str, ...]]) -> Hypothesis:
-    """The chosen hypothesis, or a related one that is decisively better where both have the same further effects."""
-    sound = [one for one in contest.hypotheses if keeps_shape(one.shape)]
-    rivals = [(one, beside_small_effects(one, chosen, sound)) for one in sound if one.elements not in refused]
-    weights = [
-        (weight_for(compared.prediction, chosen.prediction), one)
-        for one, compared in rivals
-        if compared is not one
-    ]
-    weight, best = max(weights, key=lambda pair: pair[0], default=(0.0, chosen))
-    return best if weight > decisive(1) else chosen
-
-
-def beside_small_effects(rival: Hypothesis, chosen: Hypothesis, sound: Sequence[Hypothesis]) -> Hypothesis:
-    """A rival whose difference to the chosen hypothesis is that of the two with the same further effects.
-
-    The wrong law of a family may predict better alone, because it absorbs part of small effects that are too small to be named.
-    The further effects are those with which either of the two predicts best, among the `sound` hypotheses. The rival is
-    returned unchanged where there are none, where it is not of the same families, or where one law contains the other.
-    """
-    kin = sorted(rival.family.values()) == sorted(chosen.family.values())
-    if rival is chosen or not kin or special_case(rival, chosen) or special_case(chosen, rival):
-        return rival
-    pairs = [
-        (one, other)
-        for one, beside in _further(rival, sound)
-        for other, same in _further(chosen, sound)
-        if beside == same
-    ]
-    if not pairs:
-        return rival
-    one, other = max(pairs, key=lambda pair: max(each.prediction.score for each in pair))
-    density = chosen.prediction.log_density + one.prediction.log_density - other.prediction.log_density
-    return replace(rival, prediction=replace(rival.prediction, log_density=density))
-
-
-def _further(one: Hypothesis, sound: Sequence[Hypothesis]) -> list[tuple[Hypothesis, frozenset[str]]]:
-    """Hypotheses that contain this one and predict better, each with its further effects."""
-    own = set(one.elements)
-    return [
-        (more, frozenset(more.elements) - own)
-        for more in sound
-        if more.kind == "effects"
-        and own < set(more.elements)
-        and more.prediction.score > one.prediction.score
-    ]
 
 
 def _simplest(close: Sequence[Hypothesis]) -> Hypothesis:
