@@ -3,7 +3,7 @@ parameters."""
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from rhythmid.elements.element import OFTEN_ENOUGH, Scales
 from rhythmid.identify.series import Series, displacement, dominant_frequency, record_of
 from rhythmid.identify.swing_frequency import swing_frequencies
 from rhythmid.model import Model
-from rhythmid.record.back_and_forth import goes_back_and_forth
+from rhythmid.record.back_and_forth import some_record_comes_back
 
 Array = NDArray[np.float64]
 REST_LENGTH = "linear_spring.rest_length"
@@ -33,33 +33,11 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     inertial = model.mass.value * (2 * np.pi * frequency) ** 2
     spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
     stiffness = spring if spring > NO_SPRING * inertial else inertial
-    effort, peak, pumping, reference = 0.0, 0.0, 0.0, 0.0
-    # from the model's own forcing or controller
-    driven = any(term.element.acts in ("drive", "feedback") for term in model.terms)
-    # by a voltage, for example: the recorded signal is no force
-    fed = any(term.element.takes for term in model.terms)
-    drives = [one.drive for one in series]
-    # windows and records may each have another level of the driving signal
-    levels = [float(total[0]) for one, total in zip(series, drives) if one.kind != "base_displacement"]
-    driven = driven or len(set(levels)) > 1
-    spread = float(np.std(levels)) if levels else 0.0
-    for one, total in zip(series, drives):
-        driven = driven or one.driven
-        if one.kind == "reference":
-            reference = max(reference, float(np.std(total)))
-        elif not fed:
-            effort = max(effort, float(np.std(total)), spread)
-            peak = max(peak, float(np.abs(total).max(initial=0.0)))
-    forced = [one for one in series if one.forcing is not None]
-    if forced:
-        longest = max(forced, key=lambda one: one.time[-1] - one.time[0])
-        assert longest.forcing is not None
-        line = replace(longest, value=np.asarray(longest.forcing(longest.time)))
-        pumping = dominant_frequency(line, finer=16)
+    drive = _drive(series, model)
     return Scales(
         position=position,
         velocity=max(velocity, 1e-12),
-        effort=effort or stiffness * position,
+        effort=drive.effort or stiffness * position,
         centre=float(np.mean(np.concatenate(places))),
         low=min(float(x.min()) for x in places),
         high=max(float(x.max()) for x in places),
@@ -68,26 +46,58 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         frequency=frequency,
         duration=max(float(s.time[-1] - s.time[0]) for s in series),
         period=biggest.period,
-        forcing_frequency=pumping,
-        reference=reference,
-        peak_effort=peak,
+        forcing_frequency=_forcing_frequency(series),
+        reference=drive.reference,
+        peak_effort=drive.peak,
         rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
         displaced_base=any(one.kind == "base_displacement" for one in series),
-        idle=not driven,
+        idle=not drive.acts,
         changes=_changes(series, model),
-        swings=(0.0, 0.0) if driven else swing_frequencies(series),
-        comes_back=_comes_back(series, places),
+        swings=(0.0, 0.0) if drive.acts else swing_frequencies(series),
+        comes_back=some_record_comes_back((record_of(one), place) for one, place in zip(series, places)),
         once=all(_once(v) for _, v in motions),
         signal=_signal(series),
     )
 
 
-def _comes_back(series: Sequence[Series], places: Sequence[Array]) -> bool:
-    """Whether the position goes back and forth in some record."""
-    by_record: dict[str, list[Array]] = {}
-    for one, place in zip(series, places, strict=True):
-        by_record.setdefault(record_of(one), []).append(place)
-    return any(map(goes_back_and_forth, by_record.values()))
+@dataclass(frozen=True)
+class _Drive:
+    """Sizes of the driving signals: rms and largest value of the recorded force, rms of a reference; whether anything drives the machine."""
+
+    effort: float
+    peak: float
+    reference: float
+    acts: bool
+
+
+def _drive(series: Sequence[Series], model: Model) -> _Drive:
+    effort, peak, reference = 0.0, 0.0, 0.0
+    # from the model's own forcing or controller
+    acts = any(term.element.acts in ("drive", "feedback") for term in model.terms)
+    # by a voltage, for example: the recorded signal is no force
+    fed = any(term.element.takes for term in model.terms)
+    drives = [one.drive for one in series]
+    # windows and records may each have another level of the driving signal
+    levels = [float(total[0]) for one, total in zip(series, drives) if one.kind != "base_displacement"]
+    acts = acts or len(set(levels)) > 1 or any(one.driven for one in series)
+    spread = float(np.std(levels)) if levels else 0.0
+    for one, total in zip(series, drives):
+        if one.kind == "reference":
+            reference = max(reference, float(np.std(total)))
+        elif not fed:
+            effort = max(effort, float(np.std(total)), spread)
+            peak = max(peak, float(np.abs(total).max(initial=0.0)))
+    return _Drive(effort, peak, reference, acts)
+
+
+def _forcing_frequency(series: Sequence[Series]) -> float:
+    """Strongest frequency [Hz] of the longest recorded forcing; 0 without one."""
+    forced = [one for one in series if one.forcing is not None]
+    if not forced:
+        return 0.0
+    longest = max(forced, key=lambda one: one.time[-1] - one.time[0])
+    assert longest.forcing is not None
+    return dominant_frequency(replace(longest, value=np.asarray(longest.forcing(longest.time))), finer=16)
 
 
 def _once(speed: Array) -> bool:

@@ -1,6 +1,6 @@
 """Whether a motion goes back and forth, so that its positions are met in both directions."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,3 +20,11 @@ def goes_back_and_forth(parts: Sequence[Array]) -> bool:
     up, down = float(steps[steps > 0.0].sum()), -float(steps[steps < 0.0].sum())
     travel = float(np.ptp(np.concatenate(parts)))
     return min(up, down) >= BOTH_WAYS * travel
+
+
+def some_record_comes_back(parts: Iterable[tuple[Hashable, Array]]) -> bool:
+    """Whether the position goes back and forth in some record; each part, float64[samples], comes with what names its record."""
+    by_record: dict[Hashable, list[Array]] = {}
+    for record, part in parts:
+        by_record.setdefault(record, []).append(part)
+    return any(map(goes_back_and_forth, by_record.values()))

@@ -14,11 +14,12 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales
 from rhythmid.elements.first_guess import rescaled
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import Alignment, EffortFit, size_of
+from rhythmid.identify.inverse_dynamics.estimate import Alignment, EffortFit, linearise, size_of
 from rhythmid.identify.least_squares import orthonormal
 from rhythmid.identify.student import weights_of
 from rhythmid.model import INERTIA, Model
 from rhythmid.simulation.transport import INPUT_DELAY
+from rhythmid.value import Prior
 
 Array = NDArray[np.float64]
 SEEN = ("force", "actuator")  # slots whose elements show in the effort balance
@@ -236,3 +237,20 @@ def widest(balance: Balance, column: Array) -> float:
     """Change of a parameter that changes the effort by the effort's own size; `column` (n,) is the effect per unit."""
     strength = float(np.sqrt(np.mean(column**2)))
     return size_of(balance) / strength if strength > 0.0 else math.inf
+
+
+def priors_of_effect(balance: Balance, model: Model, label: str, alignment: float) -> dict[str, Prior]:
+    """Priors of an effect's parameters in a model: a change of any of them may change the effort by at most the effort's size."""
+    term = model.term(label)
+    assert term is not None
+    names = [name for name in model.free if name.startswith(f"{label}.")]
+    _, columns = linearise(balance, model, names, alignment)
+    found: dict[str, Prior] = {}
+    for name, column in zip(names, columns[:, 1:].T, strict=True):
+        value, mean = model.parameters[name], model.value(name)
+        if name == f"{label}.{term.element.size}" and math.isfinite(term.element.absent):
+            mean = term.element.absent
+        spread = widest(balance, column)
+        width = value.bounds[1] - value.bounds[0]
+        found[name] = Prior(mean, min(spread, width if width > 0.0 else spread))
+    return found

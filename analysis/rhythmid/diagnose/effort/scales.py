@@ -1,19 +1,16 @@
 """Scales of the measured motion and of the effort, for first guesses of elements' parameters."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rhythmid.elements.element import Scales
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
-from rhythmid.identify.inverse_dynamics.motion import Motion
 from rhythmid.identify.position_lines import lines_below
 from rhythmid.identify.record_scales import NO_SPRING, REST_LENGTH
 from rhythmid.model import Model
-from rhythmid.record.back_and_forth import goes_back_and_forth
+from rhythmid.record.back_and_forth import some_record_comes_back
 
 
 def scales_at(balance: Balance, fit: EffortFit) -> Scales:
@@ -51,13 +48,5 @@ def scales_of(balance: Balance, model: Model) -> Scales:
         peak_effort=float(np.abs(effort).max()),
         rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
         displaced_base=any(motion.driven_by_base for motion in motions),
-        comes_back=_comes_back(motions),
+        comes_back=some_record_comes_back((one.record, one.leg_position) for one in motions),
     )
-
-
-def _comes_back(motions: Sequence[Motion]) -> bool:
-    """Whether the position goes back and forth in some record."""
-    by_record: dict[int, list[NDArray[np.float64]]] = {}
-    for one in motions:
-        by_record.setdefault(one.record, []).append(one.leg_position)
-    return any(map(goes_back_and_forth, by_record.values()))

@@ -22,6 +22,7 @@ from rhythmid.diagnose.effort.candidate import (
     extended,
     late_start,
     not_tried,
+    priors_of_effect,
     screen,
     starts_of,
     widest,
@@ -321,7 +322,7 @@ class _Search:
             _, columns = linearise(balance, base.fit.model, [start.name], alignment)
             priors[start.name] = Prior(base.fit.model.value(start.name), widest(balance, columns[:, 1]))
         else:
-            priors |= self._priors(model, label, start.element, alignment)
+            priors |= priors_of_effect(balance, model, label, alignment)
         if any(not math.isfinite(prior.std) or prior.std <= 0.0 for prior in priors.values()):
             return None
         return self._fit((*base.elements, label), model, priors, aligned, alignment)
@@ -336,22 +337,6 @@ class _Search:
             gains = (beyond_gain(model, label, sizes, self.recorded, required) for label in laws)
             shape["more_than_gain"] = min(gains)
         return shape
-
-    def _priors(self, model: Model, label: str, element: Element, alignment: float) -> dict[str, Prior]:
-        """Priors of an addition: a change of any of its parameters may change the effort by at most the effort's size."""
-        names = [name for name in model.free if name.startswith(f"{label}.")]
-        _, columns = linearise(self.balance, model, names, alignment)
-        found: dict[str, Prior] = {}
-        for name, column in zip(names, columns[:, 1:].T, strict=True):
-            value = model.parameters[name]
-            own = name.split(".", 1)[1]
-            mean = value.value
-            if own == element.size and math.isfinite(element.absent):
-                mean = element.absent
-            spread = widest(self.balance, column)
-            width = value.bounds[1] - value.bounds[0]
-            found[name] = Prior(mean, min(spread, width if width > 0.0 else spread))
-        return found
 
     def _fit(
         self, elements: tuple[str, ...], model: Model, priors: dict[str, Prior], aligned: Alignment, at: float

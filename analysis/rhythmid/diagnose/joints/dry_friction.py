@@ -2,13 +2,12 @@
 
 import math
 
-from rhythmid.diagnose.effort.candidate import Start, extended, starts_of, widest
+from rhythmid.diagnose.effort.candidate import Start, extended, priors_of_effect, starts_of
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.diagnose.joints.joint_case import JointResult
 from rhythmid.diagnose.joints.link_evidence import laws_of, parts_of
-from rhythmid.identify.inverse_dynamics.estimate import fit_effort, linearise
-from rhythmid.value import Prior
+from rhythmid.identify.inverse_dynamics.estimate import fit_effort
 
 DRY = "coulomb_friction"
 
@@ -43,13 +42,7 @@ def dry_in_place(one: JointResult, law: Fitted) -> Fitted:
 def _fitted(nominal: Fitted, one: JointResult, start: Start, aligned: float) -> Fitted | None:
     balance = one.result.search.balance
     model, label = extended(nominal.fit.model, start, 1.0)
-    names = [name for name in model.free if name.startswith(f"{label}.")]
-    _, columns = linearise(balance, model, names, aligned)
-    # a change of any of its parameters may change the effort by at most the effort's size
-    added = {
-        name: Prior(model.value(name), widest(balance, column))
-        for name, column in zip(names, columns[:, 1:].T, strict=True)
-    }
+    added = priors_of_effect(balance, model, label, aligned)
     if any(not 0.0 < prior.std < math.inf for prior in added.values()):
         return None
     priors = {**nominal.priors, **added}

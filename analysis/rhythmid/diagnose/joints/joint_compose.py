@@ -81,31 +81,15 @@ def compose_machine(
         for j, one in answers.items()
         if one.verdict == "undecided" and j not in sure and (not stated[j] or j in named)
     )
-    verdict: Verdict = "consistent"
-    if sure:
-        verdict = "missing_physics"
-    elif unknown:
-        verdict = "unknown_physics"
-    elif undecided or missing:
-        verdict = "undecided"
+    own = {joint: one.indistinguishable for joint, one in answers.items() if joint in {*named, *undecided}}
     return MachineDiagnosis(
-        verdict=verdict,
+        verdict=_verdict(bool(sure), bool(unknown), bool(undecided or missing)),
         summary=summary_of_joints(missing, unknown, undecided, answers, of_links, tilt),
         location=_location(missing, unknown, undecided),
         missing=tuple(missing),
         unknown=unknown,
         undecided=undecided,
-        indistinguishable=tuple(
-            tuple(f"{joint}: {name}" for name in group)
-            for joint, one in answers.items()
-            if joint in named or joint in undecided
-            for group in one.indistinguishable
-        )
-        + tuple(
-            tuple(f"{machine.body.joint_of(link)}: {name}" for name in names)
-            for link, names in of_links.items()
-            if len(names) > 1
-        ),
+        indistinguishable=_indistinguishable(machine, own, of_links),
         fit={joint: {str(k): v for k, v in one.fit.items()} for joint, one in answers.items()},
         parameters={
             f"{joint}.{name}": value
@@ -129,6 +113,24 @@ def compose_machine(
         ),
         reference_delay=delay,
     )
+
+
+def _verdict(sure: bool, unknown: bool, doubtful: bool) -> Verdict:
+    """The verdict on the machine, by whether some effect is sure, the law at some joint is unknown, or anything else is in doubt."""
+    if sure:
+        return "missing_physics"
+    if unknown:
+        return "unknown_physics"
+    return "undecided" if doubtful else "consistent"
+
+
+def _indistinguishable(
+    machine: Machine, own: Mapping[str, tuple[tuple[str, ...], ...]], of_links: Mapping[str, tuple[str, ...]]
+) -> tuple[tuple[str, ...], ...]:
+    """Groups of names that the records do not separate: those of joints, and the quantities of links, of which any may be the wrong one."""
+    places = [(joint, group) for joint, groups in own.items() for group in groups]
+    places += [(machine.body.joint_of(link), names) for link, names in of_links.items() if len(names) > 1]
+    return tuple(tuple(f"{joint}: {name}" for name in group) for joint, group in places)
 
 
 def _effect(machine: Machine, one: JointResult, answer: Diagnosis, label: str) -> JointEffect:

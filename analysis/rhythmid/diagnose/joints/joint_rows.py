@@ -3,29 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.identify.inverse_dynamics.estimate import fit_effort
-from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.least_squares import orthonormal
 from rhythmid.identify.student import autocorrelation_time, scale_of, weights_of
-from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-
-
-def weighted_rows(
-    balances: JointBalances, joint: str, model: Model, late: float, link: str
-) -> tuple[Array, Array]:
-    """Residual (n,) of a joint with its path fitted, and columns (n, 10) of the inertia of a link, in units of the joint's noise.
-
-    The other parameters of the joint are projected out.
-    """
-    body = balances.machine.body
-    own = body.joints[joint].velocity
-    balance = balances.balance(joint, late)
-    fit = fit_effort(balance, model)
-    made = [body.inertial_columns(link, b.pose, b.rate, b.acceleration)[:, own] for b in balances.bodies]
-    columns = balance.rows(made, balance.later(fit.model, fit.alignment))
-    return in_units_of_noise(fit.residual, columns, fit.jacobian, balance.record)
 
 
 def in_units_of_noise(

@@ -17,8 +17,9 @@ from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.joints.joint_case import JointResult
-from rhythmid.diagnose.joints.joint_rows import weighted_rows
 from rhythmid.diagnose.joints.link_evidence import own_path
+from rhythmid.diagnose.joints.machine_cause import rows_of
+from rhythmid.identify.inverse_dynamics.estimate import fit_effort
 from rhythmid.identify.joints.joint_motion import JointBalances
 
 Array = NDArray[np.float64]
@@ -78,13 +79,19 @@ def carried(body: MujocoBody, link: str) -> tuple[str, ...]:
 
 def _columns(balances: JointBalances, one: JointResult, links: Sequence[str]) -> Array:
     """Effects (n, links) of a kilogram more on each link at a joint, in units of the noise; what the joint's path explains is projected out."""
-    model = own_path(balances, one)
-    made = []
-    for link in links:
-        own = balances.machine.body.own(link)
-        _, columns = weighted_rows(balances, one.joint, model, one.late, link)
-        made.append(columns @ own.ten / own.mass)
-    return np.column_stack(made)
+    body, balance = balances.machine.body, balances.balance(one.joint, one.late)
+    fit, turns = fit_effort(balance, own_path(balances, one)), body.joints[one.joint].velocity
+    per_kilogram = {link: body.own(link).ten / body.own(link).mass for link in links}
+    made = [
+        np.column_stack(
+            [
+                body.inertial_columns(link, at.pose, at.rate, at.acceleration)[:, turns] @ ten
+                for link, ten in per_kilogram.items()
+            ]
+        )
+        for at in balances.bodies
+    ]
+    return rows_of(balance, fit, made)[1]
 
 
 def sizes(columns: Array, change: float) -> Array:
