@@ -277,3 +277,18 @@ def test_friction_that_matters_for_the_motion_is_named_whatever_weight_the_effor
     answer = diagnose([heavy], model, catalogue=FEW).diagnosis
     assert [effect.element for effect in answer.missing] == ["coulomb_friction"]
     assert answer.augmented.train_nrmse > 1e-3  # of what varies, not of the weight
+
+
+@pytest.mark.parametrize(("least", "named"), [(0.5, True), (0.9, False)])
+def test_an_actuators_effect_that_takes_more_of_the_effort_than_it_may_is_kept_and_rejected(
+    monkeypatch, least, named
+):
+    assert SHAPES["moves_the_machine"] == 0.5
+    monkeypatch.setitem(SHAPES, "moves_the_machine", least)
+    one = ("actuator_deadband",)  # which has to take a fourth of the effort for dry friction
+    only = CATALOGUE.without(*(name for name in CATALOGUE if name not in (*one, "viscous_damper")))
+    found = diagnose([axis(friction=3.0, amplitude=0.2, length=10.0)], axis_model(), catalogue=only).diagnosis
+    rejected = {row.hypothesis for row in found.rejections if row.name == "moves_the_machine"}
+    assert rejected == (set() if named else {one})
+    assert one in {hypothesis.elements for hypothesis in found.hypotheses}
+    assert (one[0] in {effect.element for effect in found.missing}) is named

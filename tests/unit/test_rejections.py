@@ -41,6 +41,10 @@ def test_nothing_speaks_against_an_effect_that_explains_all():
         ("practical_size", replace(GOOD, practical=2.0)),
         ("within_bounds", replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"within_bounds": 0.0}))),
         (
+            "moves_the_machine",
+            replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"moves_the_machine": 0.4})),
+        ),
+        (
             "more_than_gain",
             replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"more_than_gain": 0.1})),
         ),

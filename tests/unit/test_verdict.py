@@ -102,7 +102,7 @@ def test_a_further_effect_has_to_remove_some_of_the_whole_mismatch(size, expecte
     assert verdict(made) == ("missing_physics", ("friction", "cubic")[:expected])
 
 
-@pytest.mark.parametrize("rule", ["within_bounds", "more_than_gain"])
+@pytest.mark.parametrize("rule", ["within_bounds", "moves_the_machine", "more_than_gain"])
 def test_an_effect_that_has_lost_its_shape_is_no_name_and_the_next_best_comes_in_its_place(rule):
     lost = supposed("play", predicted(0.05), shape={rule: 0.0})
     assert verdict(contest(NOMINAL, lost, friction()))[1] == ("friction",)
@@ -186,7 +186,7 @@ def test_a_richer_law_takes_the_place_of_one_that_it_contains_where_it_removes_m
 def test_every_rule_of_the_table_is_one_whose_effect_on_the_verdict_is_tested():
     tested = {
         "predicts_better", "predicts_ahead", "share_of_rest", "share_of_mismatch", "practical_size", "within_bounds",
-        "more_than_gain", "beats_simpler",
+        "moves_the_machine", "more_than_gain", "beats_simpler",
     }  # fmt: skip
     assert {rule.name for rule in RULES} == tested
 

@@ -122,6 +122,7 @@ AT_END = "within_bounds"  # the shape of a law whose parameters are inside its r
 # lower limits of statistics of the fitted effects themselves; a hypothesis below one of them does not compete
 SHAPES: Mapping[str, float] = {
     AT_END: EDGE,
+    "moves_the_machine": MAINLY,
     "more_than_gain": MAINLY,
 }
 
@@ -208,6 +209,11 @@ RULES: tuple[Rule, ...] = (
         "distance of the effect's parameters from the bounds within which its name applies, as a share of the bound; and of its size from that "
         "of no effect, as a share of its first guess",
         "only a limit of its parameters is identifiable, where it is another effect",
+    ),
+    _shape_rule(
+        "moves_the_machine",
+        "share of the effort that an actuator's effect leaves to move the machine",
+        "an actuator's effect that removes most of the effort cannot explain the motion",
     ),
     _shape_rule(
         "more_than_gain",

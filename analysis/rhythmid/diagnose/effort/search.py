@@ -332,11 +332,23 @@ class _Search:
         sizes = scales_of(self.balance, model)
         shape = shape_of(model, elements, sizes)
         laws = [one for one in elements if (term := model.term(one)) and term.element.slot == "actuator"]
-        if laws and self.recorded is not None:
+        if not laws:
+            return shape
+        shape["moves_the_machine"] = min(self._left(model, label) for label in laws)
+        if self.recorded is not None:
             required = np.concatenate(self.balance.required(model))
             gains = (beyond_gain(model, label, sizes, self.recorded, required) for label in laws)
             shape["more_than_gain"] = min(gains)
         return shape
+
+    def _left(self, model: Model, label: str) -> float:
+        """Share of the effort that an actuator's effect leaves to move the machine: that which a fitted model requires without it, of
+        that which the nominal one does."""
+        left, before = (
+            float(np.linalg.norm(self.balance.predicted(one, 0.0)))
+            for one in (model.pruned(label), self.nominal.fit.model)
+        )
+        return left / before if before > 0.0 else math.inf
 
     def _fit(
         self, elements: tuple[str, ...], model: Model, priors: dict[str, Prior], aligned: Alignment, at: float
