@@ -18,6 +18,7 @@ EXAMPLES = (
     "rhythmid init run.csv",
     "rhythmid init bag --joint knee --out files --yes",
     "rhythmid init bag --body robot.urdf",
+    "rhythmid init run.csv --role output=theta --role input=u --unit theta=deg",
 )
 
 
@@ -38,6 +39,21 @@ def init(
         float | None,
         typer.Option("--rate", metavar="HZ", help="Sample rate of a table, if it has no column of times."),
     ] = None,
+    role: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--role",
+            metavar="ROLE=CHANNEL",
+            help="What a channel is, instead of a guess: output (the measured motion), input (the force that drives), reference, base or "
+            "forcing; may be repeated.",
+        ),
+    ] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--unit", metavar="CHANNEL=UNIT", help="Unit of a channel, such as theta=deg; may be repeated."
+        ),
+    ] = None,
     yes: Annotated[
         bool, typer.Option("--yes", "--no-input", help="Take the best guess for everything, without asking.")
     ] = False,
@@ -57,6 +73,10 @@ def init(
         require_writable(path) if force else require_new(path)
     if body is not None and joint is not None:
         raise InputError("--joint is one joint, --body are all of a robot; give one of the two")
+    if body is not None and (role or unit):
+        raise InputError(
+            "--role and --unit are for a machine of one joint; with --body the channels are found by their names"
+        )
     known = load_catalogue(elements or ())
     if body is not None:
         from rhythmid.start.robot import start_robot
@@ -65,9 +85,11 @@ def init(
     else:
         from rhythmid.start.roles import first_answer
         from rhythmid.start.start import start
+        from rhythmid.start.stated import Stated
 
         asking = not yes and not quiet and json != STANDARD_OUTPUT and sys.stdin.isatty()
-        begun = start(sources, joint, rate, _prompt if asking else first_answer, known)
+        said = Stated.of(role or (), unit or ())
+        begun = start(sources, joint, rate, _prompt if asking else first_answer, known, said)
     write_text(signals, begun.signals)
     write_text(model, begun.model)
     terminal = Terminal(quiet, json)

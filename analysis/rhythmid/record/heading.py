@@ -86,20 +86,20 @@ def heading_of(column: str) -> Heading:
     """Parse the heading `column`: a unit in brackets, after a slash, as a suffix after an underscore or with a
     capital, directly after a name that it suits, or as a word of the name."""
     column = column.strip()
-    if column.lower() in COUNTERS and (known := _unit(column)) is not None:
+    if column.lower() in COUNTERS and (known := unit_of(column)) is not None:
         return Heading(column, *known, column)
     for pattern in (_BRACKETS, _SLASH):
-        if (match := pattern.match(column)) and (known := _unit(match[2])) is not None:
+        if (match := pattern.match(column)) and (known := unit_of(match[2])) is not None:
             return Heading(match[1].strip() or column, *known, match[2])
     suffix = _glued(column)
-    if suffix and (known := _unit(_spelled(suffix))) is not None:
+    if suffix and (known := unit_of(_spelled(suffix))) is not None:
         return Heading(column[: -len(suffix)], *known, column[-len(suffix) :])
     lowered = column.lower()
     for suffix in SUFFIXES:
         if lowered.endswith("_" + suffix) and len(column) > len(suffix) + 1:
             if len(suffix) == 1 and lowered[:-2].rsplit("_", 1)[-1] not in LETTERS[suffix].split():
                 break
-            known = _unit(_spelled(suffix))
+            known = unit_of(_spelled(suffix))
             assert known is not None
             return Heading(column[: -len(suffix) - 1], *known, column[-len(suffix) :])
     return _with_word(column)
@@ -108,7 +108,7 @@ def heading_of(column: str) -> Heading:
 def _with_word(column: str) -> Heading:
     """Parse a heading with a unit as one of its words, as in `rpm`, `rpm_left` and `Motor RPM 2`."""
     words = [match for match in re.finditer(r"[A-Za-z]+", column) if match[0].lower() in WORDS]
-    if len(words) != 1 or (known := _unit(words[0][0])) is None:
+    if len(words) != 1 or (known := unit_of(words[0][0])) is None:
         return Heading(column)
     before, after = column[: words[0].start()].rstrip(" ._"), column[words[0].end() :]
     return Heading((before + after).strip(" ._") or column, *known, words[0][0])
@@ -125,7 +125,7 @@ def _glued(column: str) -> str:
 def is_unit(text: str) -> bool:
     """Whether a cell below a column's name can be its unit: a known unit, a dash or an empty cell."""
     bare = bare_unit(text)
-    return bare in ("", "-", "1", "%") or _unit(bare) is not None
+    return bare in ("", "-", "1", "%") or unit_of(bare) is not None
 
 
 def bare_unit(text: str) -> str:
@@ -133,7 +133,7 @@ def bare_unit(text: str) -> str:
     return text.strip().strip("[](){}").strip()
 
 
-def _unit(text: str) -> tuple[str, float] | None:
+def unit_of(text: str) -> tuple[str, float] | None:
     """SI unit and factor of a written unit; None where it is unknown."""
     text = text.strip().replace(" per ", "/").replace("²", "^2").replace("^2", "²").replace("**2", "²")
     text = re.sub(r"(?<=s)2$", "²", text)

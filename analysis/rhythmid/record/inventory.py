@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ from rhythmid.record.table_clock import COUNTER, is_even, is_further_time, is_ti
 from rhythmid.record.two_clocks import clock_notes, trusted_clock
 
 Array = NDArray[np.float64]
+StatedRole = Literal["output", "input", "reference", "base", "forcing"]
 OBJECTS = (
     "a table or timetable of MATLAB is an object that others cannot read: there  writetimetable(T, 'run.csv')"
 )
@@ -67,6 +68,7 @@ class Recorded:
     sign_bit : place of the bit that is the sign of the recorded words; None where they are ordinary numbers.
     unit, scale : SI unit, empty where not stated, and its factor per recorded unit.
     time, value : float64[n], [s] and recorded values times `scale`; a message's time is its receive time.
+    stated : the role that the user gives it, None where it is to be guessed.
     stamped, sent : whether its messages have stamps, and whether the bag says when they were sent.
     """
 
@@ -85,6 +87,7 @@ class Recorded:
     sent: bool = False
     side: str = ""
     sign_bit: int | None = None
+    stated: StatedRole | None = None
 
     def __str__(self) -> str:
         return f"{self.topic} {self.field}" if self.topic else self.column

@@ -91,7 +91,7 @@ def _moving_base(base: list[Known]) -> tuple[Choice, InputKind]:
     """The largest motion of the base, and its kind."""
     choice = strongest(base, "the motion of the base")
     picked = next(one for one in base if one.one is choice.recorded)
-    if not (says_base(picked.one) and picked.meaning.certain):
+    if picked.one.stated is None and not (says_base(picked.one) and picked.meaning.certain):
         doubt = (
             "taken for a displacement of the base: say  kind: base_acceleration  where it is its acceleration, kind: reference  where it "
             "is what a controller is asked for, and no kind where it is a force"
@@ -148,7 +148,11 @@ def _reference(rest: list[Known], output: Recorded, measured: Quantity) -> tuple
         if able and (quantity == measured or quantity == "velocity"):
             scored = [(follows(one.one, output), one) for one in able]
             if quantity == measured:
-                scored = [(told, one) for told, one in scored if told.is_answer or told.correlation > COPY]
+                scored = [
+                    (told, one)
+                    for told, one in scored
+                    if told.is_answer or told.correlation > COPY or one.one.stated is not None
+                ]
             if not scored:
                 continue
             ranked = ranked_by_worth([(abs(told.correlation), one) for told, one in scored])

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
-from rhythmid.record.inventory import Recorded
+from rhythmid.record.inventory import Recorded, StatedRole
 from rhythmid.start.derivative_words import order_of, words_of_order
 
 Quantity = Literal["position", "velocity", "acceleration", "effort"]
@@ -147,7 +147,7 @@ def is_word(word: str) -> bool:
 
 
 def meaning_of(one: Recorded) -> Meaning:
-    """Meaning of a recorded number by its name, unit and type."""
+    """Meaning of a recorded number by the role that the user gives it, else by its name, unit and type."""
     near, far = words_of(one.said), words_of(one.topic)
     quantity, reason, certain = _quantity(one, near, far)
     every = {*near, *far}
@@ -178,7 +178,17 @@ def meaning_of(one: Recorded) -> Meaning:
     ):
         base, commanded = True, None
     joint = one.joint or ("" if one.topic else joint_of_column(one.said, one.side))
-    return Meaning(quantity, commanded, forcing, base, joint, reason.removeprefix("; "), certain)
+    found = Meaning(quantity, commanded, forcing, base, joint, reason.removeprefix("; "), certain)
+    return found if one.stated is None else _of_role(found, one.stated)
+
+
+def _of_role(found: Meaning, role: StatedRole) -> Meaning:
+    """The meaning of a number whose role is stated; its name or unit still says which motion it is, and who set it."""
+    driving, base = role in ("input", "forcing"), role == "base"
+    motion = found.quantity if found.quantity in MOTIONS else None if role == "reference" else "position"
+    commanded = found.commanded if driving else role == "reference"
+    quantity = "effort" if driving else motion
+    return Meaning(quantity, commanded, role == "forcing", base, found.joint, "it was stated", certain=True)
 
 
 def is_measured_effort(one: Recorded) -> bool:

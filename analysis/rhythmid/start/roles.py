@@ -68,12 +68,17 @@ def guess_roles(
 ) -> Roles:
     """Roles of the numbers in a source, of which those named in `stepped` change from one source to the next. Raises
     InputError where no number can be the output, or no joint is called `joint`."""
+    stated = [Known(one, meaning_of(one)) for one in found.recorded if one.stated is not None]
     known = [
-        Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one) and not _is_clock(one)
+        Known(one, meaning_of(one))
+        for one in found.recorded
+        if one.stated is None and not is_ignored(one) and not _is_clock(one)
     ]
     known, twice = written_once(
         with_integrals(without_slopes(with_symbols(_without_empty_letters(with_joint_positions(known)))))
     )
+    known += stated
+    moved = next((one for one in stated if one.one.stated == "output"), None)
     everything = [*known, *(Known(one, meaning_of(one)) for one in found.constant)]
     known, resting = (with_targets(part, everything) for part in (known, everything[len(known) :]))
     if not known:
@@ -81,14 +86,19 @@ def guess_roles(
     if (groups := column_groups(found)) is not None:
         known, resting = ([groups.told(one) for one in part] for part in (known, resting))
     said = [(one.one, one.meaning) for one in known]
-    carried = carried_motion(said) if joint is None else None
+    joint = joint if moved is None else moved.meaning.joint or None
+    carried = carried_motion(said) if joint is None and not stated else None
     still = [(one.one, one.meaning) for one in resting]
-    chosen = joint_of(said, still, joint, ask, str(found.path)) if carried is None else Joint()
+    unnamed = carried is not None or (moved is not None and joint is None)
+    chosen = Joint() if unnamed else joint_of(said, still, joint, ask, str(found.path))
     everything = known
-    known = [one for one in known if chosen.includes(one.one, one.meaning)]
+    known = [one for one in known if one.one.stated is not None or chosen.includes(one.one, one.meaning)]
     if carried is not None:
         notes = [*twice]
         output = Choice(carried.driven, f"a measured position: {carried.reason}", (carried.driver,))
+    elif moved is not None:
+        notes = [*twice]
+        output = Choice(moved.one, f"a measured {moved.quantity}: {moved.meaning.reason}")
     else:
         output, known = _output(known, ask, str(found.path), found.constant, chosen)
         output, known, exchanged = by_direction(output, known)
@@ -115,6 +125,8 @@ def guess_roles(
         note_of_sensor(now) for was, now in told_by_data if was is not now and now.meaning.commanded is False
     ]
     rest = [now for _, now in told_by_data]
+    if driven := [one for one in stated if one is not moved]:
+        rest = [one if one.quantity else one.taken_for(measured, one.meaning.reason) for one in driven]
     more, kind, reference_of = drivers(rest, output.recorded, measured, ask)
     if carried is not None:
         reason = f"a motion that drives {carried.driven}, and nothing else drives"
@@ -126,6 +138,7 @@ def guess_roles(
     duty = duty_before(found.constant, chosen, output.recorded, measured) if only is not None else None
     if (
         only is not None
+        and not driven
         and duty not in (None, only.recorded)
         and meaning_of(only.recorded).commanded is not True
     ):

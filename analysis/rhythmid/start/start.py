@@ -33,6 +33,7 @@ from rhythmid.start.poses import with_numbers_as_joints, without_quaternions
 from rhythmid.start.role_choice import Ask, Choice
 from rhythmid.start.roles import Roles, first_answer, guess_roles
 from rhythmid.start.sides import with_sides
+from rhythmid.start.stated import DRIVES, NOTHING, Stated
 from rhythmid.start.untold_motion import by_simpler_motion
 from rhythmid.start.yaml_text import GUESSED, as_guessed, clock_of, doubt_of_sign, model_yaml, signals_yaml
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
@@ -131,12 +132,14 @@ def guess(
     rate: float | None = None,
     ask: Ask = first_answer,
     beside: Sequence[str | Path] = (),
+    stated: Stated = NOTHING,
 ) -> Guess:
     """Inspect one recording and guess the roles of its channels; parameters and errors as for `start`. What is constant in
     it may change from one to the next of the recordings `beside` it."""
     found = with_joints(
         with_sides(with_listed_joints(with_numbers_as_joints(without_quaternions(_inventory(source, rate)))))
     )
+    found = stated.told(found)
     roles = guess_roles(found, joint, ask)
     if (
         beside
@@ -145,7 +148,7 @@ def guess(
     ):
         roles = guess_roles(found, joint, ask, steps)
     tried = _tried(source, found, roles)
-    others = tried.roles.joint.others if joint is None else []
+    others = tried.roles.joint.others if joint is None and "output" not in stated.roles else []
     first = tried.refused
     while (
         first and tried.refused and others
@@ -209,19 +212,19 @@ def _other_choice(found: Inventory, joint: str | None) -> str:
     return (
         f"another joint is chosen with --joint NAME ({names})"
         if names
-        else "write signals.yaml with another output"
+        else "another output is chosen with --role output=CHANNEL"
     )
 
 
 def _guess_of_moving(
-    sources: Sequence[str | Path], joint: str | None, rate: float | None, ask: Ask
+    sources: Sequence[str | Path], joint: str | None, rate: float | None, ask: Ask, stated: Stated
 ) -> tuple[Guess, Sequence[str | Path]]:
     """The guess for the first recording in which the machine moves, and the recordings before it; for the first
     one, and none, where it moves in none. Raises NoMotionError where no recording has a motion."""
     first, none = None, None
     for number, source in enumerate(sources):
         try:
-            found = guess(source, joint, rate, ask, [one for one in sources if one != source])
+            found = guess(source, joint, rate, ask, [one for one in sources if one != source], stated)
         except NoMotionError as error:  # what does not move in one recording may move in another
             none = none or error
             continue
@@ -250,6 +253,7 @@ def start(
     rate: float | None = None,
     ask: Ask = first_answer,
     catalogue: Catalogue | None = None,
+    stated: Stated = NOTHING,
 ) -> Start:
     """Inspect recordings of one layout and guess the roles of their channels and a nominal model.
 
@@ -260,10 +264,11 @@ def start(
     joint : the joint to identify; by default the one that moves most.
     rate : of a table without a time [Hz].
     ask : called where several candidates are close; by default the best is taken.
+    stated : roles and units of channels that need no guess.
 
     Raises InputError, one line, where a source cannot be read, or contains no possible motion.
     """
-    guessed, resting = _guess_of_moving(sources, joint, rate, ask)
+    guessed, resting = _guess_of_moving(sources, joint, rate, ask, stated)
     remarks = tuple(f"{one}: the machine stands still, so that it is not used here" for one in resting)
     moving = [one for one in sources if one not in resting]
     known = load_catalogue() if catalogue is None else catalogue
@@ -276,8 +281,10 @@ def start(
         changed = guessed if roles is guessed.roles else guessed.changed(roles, use)
         return _nominal(moving, changed.signals, roles, known)
 
-    roles, nominal = by_other_effort(guessed.inventory, guessed.roles, tried(guessed.roles), tried)
-    roles, nominal = by_command_alone(roles, nominal, tried)
+    roles, nominal = guessed.roles, tried(guessed.roles)
+    if not DRIVES & set(stated.roles):
+        roles, nominal = by_other_effort(guessed.inventory, roles, nominal, tried)
+        roles, nominal = by_command_alone(roles, nominal, tried)
     roles, nominal = by_simpler_motion(roles, nominal, tried)
     for _ in range(MOST_CORRECTIONS):
         if nominal.corrections:
