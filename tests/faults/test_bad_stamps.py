@@ -113,7 +113,7 @@ def test_a_channel_may_have_times_of_its_own_and_what_is_assumed_is_told(tmp_pat
 @pytest.mark.parametrize(
     ("time", "words"),
     [
-        ("recieve", "signals.yaml:1: input.time: 'recieve' is none of header, receive"),
+        ("recieve", "signals.yaml:1: input.time: 'recieve' is none of header, sent, receive"),
         ("{column: t}", "column and sample_rate are for tables"),
         ("{rate: 100}", "rate"),
     ],

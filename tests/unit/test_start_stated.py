@@ -68,7 +68,9 @@ def test_a_stated_output_of_a_bag_names_its_joint(tmp_path):
     roles = begun(bag, "output=/joint_states position[knee]", "input=/commands data[1]").guess.roles
     assert roles.joint.name == "knee"
     assert str(roles.choices["input"].recorded) == "/commands data[1]"
-    with pytest.raises(InputError, match=r"/commands data\[0\] never changes, so that it cannot be the input"):
+    with pytest.raises(
+        InputError, match=r"/commands data\[0\] never changes, so that it cannot be the input"
+    ):
         begun(bag, "input=/commands data[0]")
 
 

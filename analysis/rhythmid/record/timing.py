@@ -225,8 +225,11 @@ def _usual_step(step: Times) -> tuple[float, bool]:
 
 
 def _mean_step(time: Times, count: int) -> float:
-    """Median over all spans of `count` steps between times (n,) of their mean step [s]."""
-    return float(np.median(time[count:] - time[:-count])) / count
+    """Mean step [s] of spans of `count` steps between times (n,), averaged over the middle half of all such spans: a burst may end
+    at either end of a span, and the longest spans contain gaps."""
+    spans = np.sort(time[count:] - time[:-count])
+    quarter = len(spans) // 4
+    return float(np.mean(spans[quarter : len(spans) - quarter])) / count
 
 
 def put_in_order(time: Times, label: str, mend: str) -> NDArray[np.int64]:

@@ -75,12 +75,13 @@ def guess_roles(
         if one.stated is None and not is_ignored(one) and not _is_clock(one)
     ]
     known, twice = written_once(
-        with_integrals(without_slopes(with_symbols(_without_empty_letters(with_joint_positions(known)))))
+        without_slopes(with_symbols(_without_empty_letters(with_joint_positions(known))))
     )
     known += stated
     moved = next((one for one in stated if one.one.stated == "output"), None)
     everything = [*known, *(Known(one, meaning_of(one)) for one in found.constant)]
     known, resting = (with_targets(part, everything) for part in (known, everything[len(known) :]))
+    known = with_integrals(known)
     if not known:
         raise InputError(f"{found.path}: holds nothing that could be a motion")
     if (groups := column_groups(found)) is not None:
