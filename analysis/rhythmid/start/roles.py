@@ -4,44 +4,31 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-import numpy as np
-
-from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, Recorded
 from rhythmid.record.output_copy import doubt_of_copy
 from rhythmid.record.signals import InputKind, OutputKind
-from rhythmid.record.table_clock import is_time
-from rhythmid.start.by_data import by_data, note_of_unknown, output_by_data
-from rhythmid.start.carried import carried_motion
+from rhythmid.start.by_data import by_data, note_of_unknown
 from rhythmid.start.copies import copies_output, note_of_copy, note_of_sensor
-from rhythmid.start.direction import by_direction, notes_of_other_joints
+from rhythmid.start.direction import notes_of_other_joints
 from rhythmid.start.drivers import drivers
-from rhythmid.start.joint import Joint, joint_of, shows_motion
+from rhythmid.start.joint import Joint
 from rhythmid.start.meaning import (
     Quantity,
-    doubt_of_letter,
-    is_ignored,
     is_lone_v,
     meaning_of,
-    says_who_asks,
 )
-from rhythmid.start.poses import with_joint_positions
-from rhythmid.start.relation import RATIO, coherent, derivative, goes_along, runs_like_a_clock
-from rhythmid.start.role_choice import Ask, Choice, Known, pick, ranked_by_worth
+from rhythmid.start.measured_motion import Motion, measured_motion, numbers
+from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
+from rhythmid.start.role_choice import Ask, Choice, Known
 from rhythmid.start.rotary import rotary_of, rotary_of_wrench
-from rhythmid.start.slopes import with_integrals, without_slopes
-from rhythmid.start.step_before import BEFORE, duty_before, gone_to_set_point, set_point_before, step_before
-from rhythmid.start.symbols import with_symbols
-from rhythmid.start.targets import with_targets
-from rhythmid.start.unnamed_joints import column_groups
+from rhythmid.start.stated import DRIVES
+from rhythmid.start.step_before import BEFORE, duty_before, set_point_before, step_before
 from rhythmid.start.unnamed_reference import with_reference
 from rhythmid.start.unsigned_effort import without_unsigned
-from rhythmid.start.written_twice import written_once
 
 INTEGRAL = 0.9  # correlation above which a position and a velocity belong together
 PER_MINUTE = 0.02  # by which a ratio of one to sixty may be off: that of degrees is 5 % off
 UNTOLD = "no name or unit says it; where it turns, say so with units of rad and N*m"
-MEASURED: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,114 +55,110 @@ def guess_roles(
 ) -> Roles:
     """Roles of the numbers in a source, of which those named in `stepped` change from one source to the next. Raises
     InputError where no number can be the output, or no joint is called `joint`."""
-    stated = [Known(one, meaning_of(one)) for one in found.recorded if one.stated is not None]
-    known = [
-        Known(one, meaning_of(one))
-        for one in found.recorded
-        if one.stated is None and not is_ignored(one) and not _is_clock(one)
-    ]
-    known, twice = written_once(
-        without_slopes(with_symbols(_without_empty_letters(with_joint_positions(known))))
-    )
-    known += stated
-    moved = next((one for one in stated if one.one.stated == "output"), None)
-    everything = [*known, *(Known(one, meaning_of(one)) for one in found.constant)]
-    known, resting = (with_targets(part, everything) for part in (known, everything[len(known) :]))
-    known = with_integrals(known)
-    if not known:
-        raise InputError(f"{found.path}: holds nothing that could be a motion")
-    if (groups := column_groups(found)) is not None:
-        known, resting = ([groups.told(one) for one in part] for part in (known, resting))
-    said = [(one.one, one.meaning) for one in known]
-    joint = joint if moved is None else moved.meaning.joint or None
-    carried = carried_motion(said) if joint is None and not stated else None
-    still = [(one.one, one.meaning) for one in resting]
-    unnamed = carried is not None or (moved is not None and joint is None)
-    chosen = Joint() if unnamed else joint_of(said, still, joint, ask, str(found.path))
-    everything = known
-    known = [one for one in known if one.one.stated is not None or chosen.includes(one.one, one.meaning)]
-    if carried is not None:
-        notes = [*twice]
-        output = Choice(carried.driven, f"a measured position: {carried.reason}", (carried.driver,))
-    elif moved is not None:
-        notes = [*twice]
-        output = Choice(moved.one, f"a measured {moved.quantity}: {moved.meaning.reason}")
-    else:
-        output, known = _output(known, ask, str(found.path), found.constant, chosen)
-        output, known, exchanged = by_direction(output, known)
-        notes = [*twice, *exchanged]
-    choices = {"output": output}
-    own = next(one for one in known if one.one is output.recorded)
-    measured = own.quantity or "position"
-    rest = [
-        one
-        for one in known
-        if one.one is not output.recorded and not _of_other_side(one.one, output.recorded)
-    ]
-    velocity = _velocity(output, measured, rest)
+    known, resting, twice = numbers(found)
+    motion = measured_motion(found, known, resting, joint, ask)
+    beside = _beside(motion)
+    driven = _driven(found, motion, beside, stepped, ask)
+    choices = {"output": motion.output, **beside.choices, **driven.choices}
+    turning = choices if motion.carried is None else {"output": motion.output}
+    rotary, why = _rotary(turning, motion.output.recorded, bool(motion.joint.others), ask)
+    notes = (*twice, *motion.notes, *beside.notes, *driven.notes)
+    kind = _output_kind(motion.quantity)
+    return Roles(choices, driven.kind, kind, rotary, why, motion.joint, driven.reference_of, notes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """The numbers beside the output that may drive, the correlation of copies of the output by id, the velocity, and notes."""
+
+    rest: list[Known]
+    copies: Mapping[int, float]
+    choices: dict[str, Choice]
+    notes: tuple[str, ...]
+
+
+def _beside(motion: Motion) -> _Beside:
+    """Sort the numbers beside the output: its velocity, its copies, and what may drive."""
+    output, measured = motion.output.recorded, motion.quantity
+    rest = [one for one in motion.known if one.one is not output and not _of_other_side(one.one, output)]
+    velocity = _velocity(motion.output, measured, rest)
     if velocity is not None:
-        choices["velocity"] = velocity
         rest = [one for one in rest if one.one is not velocity.recorded]
-    rest = [_voltage(one, output.recorded, measured) for one in rest]
-    rest, copies, told = _without_copies(rest, output.recorded)
-    notes += told
-    rest, told = without_unsigned(rest, output.recorded, measured)
-    notes += told
-    told_by_data = [(one, by_data(one, output.recorded, measured, velocity)) for one in rest]
-    notes += [
+    rest = [_voltage(one, output, measured) for one in rest]
+    rest, copies, notes = _without_copies(rest, output)
+    rest, told = without_unsigned(rest, output, measured)
+    told_by_data = [(one, by_data(one, output, measured, velocity)) for one in rest]
+    sensors = [
         note_of_sensor(now) for was, now in told_by_data if was is not now and now.meaning.commanded is False
     ]
-    rest = [now for _, now in told_by_data]
-    if driven := [one for one in stated if one is not moved]:
-        rest = [one if one.quantity else one.taken_for(measured, one.meaning.reason) for one in driven]
-    more, kind, reference_of = drivers(rest, output.recorded, measured, ask)
-    if carried is not None:
+    choices = {} if velocity is None else {"velocity": velocity}
+    return _Beside([now for _, now in told_by_data], copies, choices, (*notes, *told, *sensors))
+
+
+@dataclass(frozen=True, eq=False)
+class _Driven:
+    """What drives the machine, the kind of the input, the quantity of which it is the reference, and notes."""
+
+    choices: dict[str, Choice]
+    kind: InputKind
+    reference_of: Quantity
+    notes: tuple[str, ...] = ()
+
+
+def _driven(found: Inventory, motion: Motion, beside: _Beside, stepped: Collection[str], ask: Ask) -> _Driven:
+    """What drives the machine: as stated, by its name, by what was set before the record, or as the user answers."""
+    output, measured = motion.output.recorded, motion.quantity
+    stated = [Known(one.one, meaning_of(one.one)) for one in motion.known if one.one.stated in DRIVES]
+    if stated:
+        rest = [one if one.quantity else one.taken_for(measured, one.meaning.reason) for one in stated]
+        return _Driven(*drivers(rest, output, measured, ask))
+    if motion.carried is not None:
+        carried = motion.carried
         reason = f"a motion that drives {carried.driven}, and nothing else drives"
-        more = {"input": Choice(carried.driver, reason, doubts=(carried.doubt,))}
-    step = None if more else step_before(found.constant, chosen, stepped)
-    if step is not None:
-        more = {"input": Choice(*step, doubts=(BEFORE,))}
-    only = more.get("input") if len(more) == 1 and kind == "force" else None
-    duty = duty_before(found.constant, chosen, output.recorded, measured) if only is not None else None
-    if (
-        only is not None
-        and not driven
-        and duty not in (None, only.recorded)
-        and meaning_of(only.recorded).commanded is not True
-    ):
-        reason = f"it feeds a motor from the first sample on, and the machine starts from rest; {only.recorded} was measured"
-        more = {"input": Choice(duty, reason, (only.recorded, *only.others), (BEFORE,))}
-    if (
-        not more
-        and (asked := set_point_before(found.constant, chosen, output.recorded, measured)) is not None
-    ):
+        return _Driven(
+            {"input": Choice(carried.driver, reason, doubts=(carried.doubt,))},
+            *drivers(beside.rest, output, measured, ask)[1:],
+        )
+    named, kind, reference_of = drivers(beside.rest, output, measured, ask)
+    named = _set_before(found, motion, named, kind, stepped)
+    if named:
+        doubted = {role: _doubted(choice, beside.copies) for role, choice in named.items()}
+        return _Driven(doubted, kind, reference_of)
+    if (asked := set_point_before(found.constant, motion.joint, output, measured)) is not None:
         reason = f"a {measured} that was asked for, to which the output goes, and nothing else drives"
-        more = {"input": Choice(asked, reason, doubts=(BEFORE,))}
-        kind, reference_of = "reference", measured
-    choices |= {role: _doubted(choice, copies) for role, choice in more.items()}
-    if not more:
-        rest, told = with_reference(own, rest)
-        notes += told
-        if told:
-            more, kind, reference_of = drivers(rest, output.recorded, measured, ask)
-            choices |= more
-    if not more:
-        more, idle = _idle(rest, output.recorded, ask)
-        choices |= more
-        others = [one for one in everything if all(one.one is not each.one for each in known)]
-        notes += idle if more else [*idle, *notes_of_other_joints(output.recorded, others)]
-    of_robot = bool(chosen.others)
-    rotary, why = _rotary(choices if carried is None else {"output": output}, output.recorded, of_robot, ask)
-    return Roles(choices, kind, _output_kind(measured), rotary, why, chosen, reference_of, tuple(notes))
+        return _Driven({"input": Choice(asked, reason, doubts=(BEFORE,))}, "reference", measured)
+    return _unnamed(motion, beside, ask)
 
 
-def _is_clock(one: Recorded) -> bool:
-    """Whether it is a time: a field that is named as one and increases, or a number that runs like a clock and has
-    no word for a motion."""
-    meaning = meaning_of(one)
-    if meaning.certain or meaning.quantity in MEASURED:
-        return False
-    return is_time(one.said, one.value) or runs_like_a_clock(one)
+def _set_before(
+    found: Inventory, motion: Motion, named: dict[str, Choice], kind: InputKind, stepped: Collection[str]
+) -> dict[str, Choice]:
+    """The drivers by their names, or a constant one that acts from the first sample on: where nothing else drives, and where a measured
+    effort is that of a motor that starts from rest."""
+    if not named:
+        step = step_before(found.constant, motion.joint, stepped)
+        named = named if step is None else {"input": Choice(*step, doubts=(BEFORE,))}
+    only = named.get("input") if len(named) == 1 and kind == "force" else None
+    if only is None or meaning_of(only.recorded).commanded is True:
+        return named
+    duty = duty_before(found.constant, motion.joint, motion.output.recorded, motion.quantity)
+    if duty in (None, only.recorded):
+        return named
+    reason = f"it feeds a motor from the first sample on, and the machine starts from rest; {only.recorded} was measured"
+    return {"input": Choice(duty, reason, (only.recorded, *only.others), (BEFORE,))}
+
+
+def _unnamed(motion: Motion, beside: _Beside, ask: Ask) -> _Driven:
+    """A reference that a measured motion follows, though no name says so; else what the user answers."""
+    output, measured = motion.output.recorded, motion.quantity
+    rest, told = with_reference(motion.own, beside.rest)
+    choices, kind, reference_of = drivers(rest, output, measured, ask)
+    if told and choices:
+        return _Driven(choices, kind, reference_of, tuple(told))
+    choices, idle = _idle(rest, output, ask)
+    others = [one for one in motion.everything if all(one.one is not each.one for each in motion.known)]
+    elsewhere = [] if choices else notes_of_other_joints(output, others)
+    return _Driven(choices, kind, reference_of, (*told, *idle, *elsewhere))
 
 
 def _of_other_side(one: Recorded, output: Recorded) -> bool:
@@ -253,61 +236,6 @@ def _is_elsewhere_of(one: Known, output: Recorded) -> bool:
 
 def _output_kind(quantity: Quantity) -> OutputKind:
     return quantity if quantity != "effort" else "position"
-
-
-def _without_empty_letters(known: list[Known]) -> list[Known]:
-    """Single letters have no meaning where all of them would be one quantity, as V1 and V2."""
-    quantities = {one.quantity for one in known}
-    told = any(one.meaning.certain or one.one.side or says_who_asks(one.one) for one in known)
-    if len(known) > 1 and len(quantities) == 1 and not told:
-        return [replace(one, meaning=replace(one.meaning, quantity=None, commanded=None)) for one in known]
-    return known
-
-
-def _output(
-    known: list[Known], ask: Ask, place: str, constant: Sequence[Recorded], joint: Joint
-) -> tuple[Choice, list[Known]]:
-    """The measured motion: a position before a velocity before an acceleration; of several, the one that goes to the
-    set point among the constants, else the one that moves most."""
-    for quantity in MEASURED:
-        able = [
-            one for one in known
-            if one.quantity == quantity and one.meaning.commanded is not True and not one.meaning.forcing and not one.meaning.base
-        ]  # fmt: skip
-        if joint.requested:  # a motion of no joint, such as the motor's, only where it has none of its own
-            able = [one for one in able if one.meaning.joint == joint.name] or able
-        if able:
-            steered = (
-                gone_to_set_point(constant, joint, [one.one for one in able], quantity)
-                if len(able) > 1
-                else None
-            )
-            ranked = ranked_by_worth(
-                [(np.inf if one.one is steered else _worth_as_output(one), one) for one in able]
-            )
-            best = pick("Which is the measured motion (output)?", ranked, ask)
-            picked = ranked[best][1]
-            reason = next(one.meaning.reason for one in able if one.one is picked)
-            if picked is steered:
-                reason += "; of those it comes nearest to the set point"
-            elif len(able) > 1:
-                reason += "; of those it moves most"
-            others = tuple(one for _, one in ranked if one is not picked)
-            doubt = doubt_of_letter(picked)
-            return Choice(
-                picked, f"a measured {quantity}: {reason}", others, (doubt,) if doubt else ()
-            ), known
-    able = [one for one in known if one.quantity in (None, "position") and not one.meaning.forcing]
-    measured = [one for one in able if one.meaning.commanded is not True and not one.meaning.base]
-    return output_by_data(measured or able, known, place)
-
-
-def _worth_as_output(one: Known) -> float:
-    """Score by the size of the motion. Numbers with more than a few values, named as measured, or named by a word
-    come before the others."""
-    moved = float(np.nanstd(one.one.value))
-    moved *= 1e6 if shows_motion(one.one) else 1.0
-    return moved * (1e3 if one.meaning.certain else 1.0) * (1e3 if one.meaning.commanded is False else 1.0)
 
 
 def _velocity(output: Choice, measured: Quantity, rest: list[Known]) -> Choice | None:
