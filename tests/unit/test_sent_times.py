@@ -1,6 +1,6 @@
 """A bag that says when its messages were sent gives these times; the delay of their receipt changes nothing."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,8 @@ from foreign import STORE, array, joint_state
 from rhythmid.errors import InputError
 from rhythmid.record.bag import Bag
 from rhythmid.record.bag_writer import add_topic, new_bag
+from rhythmid.record.columns import read_columns
+from rhythmid.record.field import Field
 from rhythmid.record.read import read_record
 from rhythmid.record.recover import recover
 from rhythmid.record.signals import Signals
@@ -65,6 +67,21 @@ def test_a_command_has_the_time_at_which_it_was_sent(tmp_path):
     steps = np.diff(read(bag, "sent").input.time)
     np.testing.assert_allclose(steps, 0.005, atol=1e-8)
     assert np.std(np.diff(read(bag, "receive").input.time)) > 1e-3
+
+
+def test_that_sent_times_and_stamps_are_of_one_clock_is_told_as_an_assumption(tmp_path):
+    notes = read(recorded(tmp_path), "sent").quality.notes
+    assert [one for one in notes if one.startswith("assumed")] == [
+        "assumed: input (time of sending) and output (stamps) share one clock; an offset between the clocks counts as delay"
+    ]
+
+
+def test_a_recorder_that_writes_zero_for_when_messages_were_sent_does_not_say_it(tmp_path):
+    wanted = {"/command": [Field.parse("data[0]")]}
+    blocks = list(Bag(recorded(tmp_path).path).blocks(lambda topic: topic.name == "/command"))
+    assert read_columns(blocks, wanted)["/command"].sent_ns is not None
+    zero = [replace(block, sent_ns=np.zeros_like(block.log_ns)) for block in blocks]
+    assert read_columns(zero, wanted)["/command"].sent_ns is None
 
 
 @pytest.mark.parametrize(("storage", "known"), [("sqlite3", True), ("mcap", False)])

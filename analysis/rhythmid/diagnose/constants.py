@@ -60,7 +60,8 @@ STATED = 0.8
 # share of all that free maps and names together explain that the names must explain, for the names to be stated
 EXPLAINED_BY_NAMES = 0.8
 # half: share of an actuator's action from which it is more than a gain; share of the effort that an actuator's effect has to leave to
-# move the machine; share of the measurement that a model may miss in a predictable way (from the residual's own past), beyond which it describes another machine
+# move the machine; share of the measurement that a model may miss in a predictable way (from the residual's own past), beyond which it
+# describes another machine
 MAINLY = 0.5
 # chance that the catalogue holds the truth, as a function of the unexplained share of the explainable mismatch: one half at
 # `ADEQUATE`, falling with the power `STEEPNESS` (fitted to sealed cases whose truth was in the catalogue or not: docs/proof.md)

@@ -8,12 +8,16 @@ from rhythmid.record.quality import ChannelQuality
 # [s] difference of two channels' latencies above which their stamps hardly come from one clock
 CLOCKS_APART = 1.0
 APART_BY = 5.0  # standard deviations above which two clocks are reported to drift apart
+TIMES = {
+    "receive": "time of receipt",
+    "sent": "time of sending",
+    "header": "stamps",
+}  # kinds of a bag's times
 WORTH_TELLING = 0.1  # drift over a record in sample periods; a smaller one affects no delay
 
 
 def clock_notes(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
-    """Notes on the clocks of channels by role; `clocks` says for each channel whether its times are `header` or
-    `receive` times."""
+    """Notes on the clocks of channels by role; `clocks` says for each channel of what kind its times are."""
     return (
         *_different(channels),
         *assumed_clock(channels, clocks),
@@ -34,15 +38,21 @@ def _different(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
 
 
 def assumed_clock(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
-    """Assumption where some channels use stamps as times and others receive times."""
-    if set(clocks.values()) != {"header", "receive"}:
+    """Assumption where channels of a bag have times of different kinds."""
+    kinds = [kind for kind in TIMES if kind in clocks.values()]
+    if len(kinds) < 2 or not set(clocks.values()) <= set(TIMES):
         return ()
-    received = " and ".join(role for role, kind in clocks.items() if kind == "receive")
-    stamped = [role for role, kind in clocks.items() if kind == "header"]
-    least = min(found for role in stamped if (found := channels[role].lateness_min) is not None)
+    told = (
+        f"{' and '.join(role for role, own in clocks.items() if own == kind)} ({TIMES[kind]})"
+        for kind in kinds
+    )
+    older = ""
+    if "receive" in kinds:
+        stamped = [role for role, kind in clocks.items() if kind != "receive"]
+        least = min(found for role in stamped if (found := channels[role].lateness_min) is not None)
+        older = f"the stamps are at least {1e3 * least:.3g} ms older than their receipt, and "
     return (
-        f"assumed: {received} (time of receipt) and {' and '.join(stamped)} (stamps) share one clock; the stamps are at least "
-        f"{1e3 * least:.3g} ms older than their receipt, and an offset between the clocks counts as delay",
+        f"assumed: {' and '.join(told)} share one clock; {older}an offset between the clocks counts as delay",
     )
 
 

@@ -136,14 +136,18 @@ class _Reader:
         return Columns(
             self.topic,
             log_ns,
-            # recorders that do not know when a message was published write the receive time
-            None if sent_ns is None or np.array_equal(sent_ns, log_ns) else sent_ns,
+            sent_ns if sent_ns is not None and _says_when_sent(sent_ns, log_ns) else None,
             stamp_ns,
             dict(zip(self.fields, rows, strict=False)),
             dict(zip(self.fields, missing, strict=False)),
             self.reason,
             self.singly,
         )
+
+
+def _says_when_sent(sent_ns: NDArray[np.int64], log_ns: NDArray[np.int64]) -> bool:
+    """Whether these are times of publication: recorders that do not know them write the receive time, or zero."""
+    return len(sent_ns) > 0 and int(sent_ns.min()) > 0 and not np.array_equal(sent_ns, log_ns)
 
 
 def without_times(columns: Columns, kind: str) -> str:

@@ -11,12 +11,11 @@
 
 A channel is a field of a topic, or a `column` of a `file` (.mat, .csv, .npz; relative to signals.yaml). `tables:
 {file: …}` names one file for all channels; without a file it is a column of the table that is read. `time:` may
-also be given for a single channel, for example for commands without stamps: `input: {topic: /command, field: data,
-time: receive}`. A channel's value is `scale` * recorded + `offset`, in `unit`; the offset of an encoder that is zeroed before each
-recording is given by record: `offset: {slow: 0, fast: 3.14}`. `sign_bit: 15` says that bit 15 of the
-recorded word is its sign. `input: none` declares that at most
-the forcing drives the machine. `forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}` states amplitude * cos(2π
-frequency t + phase) in the record's time. A model parameter with a different value in each record, such as a
+also be given for a single channel, for example for commands without stamps: `input: {topic: /command, field: data, time: sent}`.
+A channel's value is `scale` * recorded + `offset`, in `unit`; the offset of an encoder that is zeroed before each
+recording is given by record: `offset: {slow: 0, fast: 3.14}`. `sign_bit: 15` says that bit 15 of the recorded word is its sign.
+`input: none` declares that at most the forcing drives the machine. `forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}` states
+amplitude * cos(2π frequency t + phase) in the record's time. A model parameter with a different value in each record, such as a
 controller's gain, is declared by its value. If one file is used for several records, it is declared by record:
 `parameters: {position_control.proportional: {slow: 12.5, fast: 25}}`. A parameter that all records declare is not
 estimated.
@@ -393,7 +392,7 @@ def _clock(node: Node, given: _Clock | BagClock, tables: bool) -> Clock:
         return Clock(given)
     if not tables:
         node.fail(
-            "column and sample_rate are for tables; the messages of a bag have times: header, sent or receive"
+            f"column and sample_rate are for tables; a bag's messages have times: {', '.join(BAG_CLOCKS)}"
         )
     if given.column is not None and given.sample_rate is None:
         return Clock("column", column=given.column, scale=1.0 if given.scale is None else given.scale)

@@ -309,8 +309,12 @@ def best_changes(fit: Fit, changes: Iterable[Change], count: int) -> list[Change
 
 def unexplained(fit: Fit) -> Array:
     """The whitened residual (n,) of a fit without its part along the effects of the free parameters."""
-    left, _ = parameter_basis(fit)
-    return fit.linearisation.residual - left @ (left.T @ fit.linearisation.residual)
+    return _beyond(parameter_basis(fit)[0], fit.linearisation.residual)
+
+
+def _beyond(basis: Array, values: Array) -> Array:
+    """Values (n,) without their part along the columns of an orthonormal basis (n, r)."""
+    return values - basis @ (basis.T @ values)
 
 
 def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change, Array]]:
@@ -319,8 +323,7 @@ def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change,
     Changes that these can reproduce are left out.
     """
     left, made_by = parameter_basis(fit)
-    residual = fit.linearisation.residual
-    residual = residual - left @ (left.T @ residual)
+    residual = _beyond(left, fit.linearisation.residual)
     parts = [(series, series.stretches(fit.noise)) for series in fit.run.series]
     for one in changes:
         with np.errstate(over="ignore", invalid="ignore"):  # changes that overflow in whitening are left out
@@ -329,7 +332,7 @@ def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change,
             ]
             raw = math.sqrt(sum(float(w @ w) for w in white))
             joined = fit.linearisation.without_starts(white)
-            change = joined - left @ (left.T @ joined)
+            change = _beyond(left, joined)
             strength = float(change @ change)
         if not math.isfinite(strength) or raw == 0.0 or strength <= (1e-6 * raw) ** 2:
             continue  # within the span of the nominal parameters
