@@ -122,6 +122,24 @@ def test_pairs_need_both_names_and_both_slots():
     assert half.outcome == "wrong" and not half.slot_right
 
 
+@pytest.mark.parametrize(
+    ("design", "laws", "probability", "outcome"),
+    [
+        ("motor", ("actuator_lag", "command_lag", "sensor_lag"), 0.95, "family"),
+        ("motor", ("actuator_lag", "command_lag", "sensor_lag"), 0.7, "wrong"),
+        ("motor", ("command_lag", "sensor_lag"), 0.95, "wrong"),
+        ("motor", ("actuator_lag", "command_hold"), 0.95, "wrong"),
+        ("hopper", ("actuator_lag", "command_lag", "sensor_lag"), 0.95, "wrong"),
+    ],
+)
+def test_of_a_pair_the_family_is_enough_where_no_record_of_the_machine_tells_its_laws_apart(
+    design, laws, probability, outcome
+):
+    both = truth("constant_force", "actuator_lag", kind="pairs", design=design)
+    lag = {"family": "lag", "laws": list(laws), "share": 0.1, "probability": probability}
+    assert judged(both, answer("missing_physics", "constant_force") | {"families": [lag]}).outcome == outcome
+
+
 def test_a_diagnosis_that_fails_is_scored_as_failed():
     failed = {"failure": "refused: no", "seconds": 1.0, "processor_seconds": 1.0}
     assert judged(truth("backlash"), failed).outcome == "failed"

@@ -57,8 +57,8 @@ class Score:
     """The score of one case.
 
     `outcome` is "exact" if all concealed effects were named, and besides them only clutter that was present or its relatives. It is
-    "family" if they were named or declared indistinguishable from a named effect, in a family of two or as the richer law. It is
-    "wrong" if anything else was named. `dominant_first`: the name with the largest share was concealed. `heldout` is the ratio of the
+    "family" if they were named or declared indistinguishable from a named effect, in a family of two or as the richer law, or if the
+    answer states their family and leaves open only laws that no record of the machine separates. It is "wrong" if anything else was named. `dominant_first`: the name with the largest share was concealed. `heldout` is the ratio of the
     held-out error to the noise floor; None where the effort was scored or recorded. `kinds` are the families reported as missing, the
     largest share first.
     """
@@ -142,8 +142,9 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
     clutter = tuple(sorted(one["effect"]["name"] for one in truth["clutter"]))
     kin = _kin_of(clutter, catalogue)
     stands_for = {name: _declared(name, families, catalogue) for name in named}
-    outcome = _outcome(true, stands_for, answer, kin)
-    if outcome == "undecided" and _all_alike(true, families, DESIGNS[truth["design"]].alike):
+    alike = DESIGNS[truth["design"]].alike
+    outcome = _outcome(true, stands_for, answer, kin, _left_open(answer, alike))
+    if outcome == "undecided" and _all_alike(true, families, alike):
         outcome = "family"
     ranked = _ranked(answer)
     said = {effect["slot"] for effect in answer.get("missing", ())}
@@ -216,6 +217,12 @@ def _all_alike(true: tuple[str, ...], families: tuple[tuple[str, ...], ...], ali
     return bool(true) and any(set(true) <= set(group) <= alike for group in families)
 
 
+def _left_open(answer: dict[str, Any], alike: frozenset[str]) -> set[str]:
+    """Effects whose family an answer states, and of whose laws it leaves open only those that no record of the machine separates."""
+    stated = (set(one["laws"]) for one in answer.get("families", ()) if one["probability"] >= SURE)
+    return {name for laws in stated if laws <= alike for name in laws}
+
+
 def _declared(name: str, families: tuple[tuple[str, ...], ...], catalogue: Catalogue) -> set[str]:
     """The effects for which a name counts.
 
@@ -240,6 +247,7 @@ def _outcome(
     stands_for: Mapping[str, set[str]],
     answer: dict[str, Any],
     kin: Collection[str],
+    left_open: Collection[str],
 ) -> Outcome:
     if "verdict" not in answer:
         return "failed"
@@ -255,9 +263,10 @@ def _outcome(
         match = next((n for n in beside if n == name), None) or next(
             (n for n in beside if name in stands_for[n]), None
         )
-        if match is None:
+        if match is not None:
+            beside.remove(match)
+        elif name not in left_open:
             return "wrong"
-        beside.remove(match)
     return "wrong" if beside or not true else "family"
 
 

@@ -26,6 +26,7 @@ ELEMENT = Element(
         "pendulum_gravity.reference",
         "gravity.acceleration",
     ),
+    special_case_of=("linear_spring",),  # for a rest length far outside the travel
     also_known_as=("bias force",),
     confusable={
         "sensor_offset": "the same on a linear spring: record the effort at rest",
