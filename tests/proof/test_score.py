@@ -115,6 +115,12 @@ def test_what_no_record_of_a_machine_tells_apart_need_not_be_decided(design, gro
     assert judged(truth("actuator_lag", design=design), said).outcome == outcome
 
 
+def test_two_forms_of_one_law_need_not_be_decided():
+    said = answer("undecided", "clock_skew", families=[("clock_skew", "delay_drift")])
+    assert judged(truth("delay_drift"), said).outcome == "family"
+    assert judged(truth("clock_skew", "backlash"), said).outcome == "undecided"
+
+
 def test_pairs_need_both_names_and_both_slots():
     both = truth("coulomb_friction", "backlash", kind="pairs")
     assert judged(both, answer("missing_physics", "backlash", "coulomb_friction")).outcome == "exact"

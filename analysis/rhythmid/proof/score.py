@@ -10,6 +10,7 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
 from rhythmid.proof.equations import FOREIGN
 from rhythmid.proof.machines.designs import DESIGNS
+from rhythmid.proof.sizes import EQUIVALENT
 
 Outcome = Literal["exact", "family", "wrong", "unknown", "undecided", "consistent", "failed"]
 FAMILY = 2  # largest number of members of a declared family
@@ -142,7 +143,7 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
     clutter = tuple(sorted(one["effect"]["name"] for one in truth["clutter"]))
     kin = _kin_of(clutter, catalogue)
     stands_for = {name: _declared(name, families, catalogue) for name in named}
-    alike = DESIGNS[truth["design"]].alike
+    alike = (*EQUIVALENT, DESIGNS[truth["design"]].alike)
     outcome = _outcome(true, stands_for, answer, kin, _left_open(answer, alike))
     if outcome == "undecided" and _all_alike(true, families, alike):
         outcome = "family"
@@ -212,15 +213,17 @@ def _ranked(answer: dict[str, Any]) -> list[dict[str, Any]]:
     return missing
 
 
-def _all_alike(true: tuple[str, ...], families: tuple[tuple[str, ...], ...], alike: frozenset[str]) -> bool:
+def _all_alike(
+    true: tuple[str, ...], families: tuple[tuple[str, ...], ...], alike: Sequence[frozenset[str]]
+) -> bool:
     """Whether an answer only leaves open effects that no record of the machine separates, the true ones among them."""
-    return bool(true) and any(set(true) <= set(group) <= alike for group in families)
+    return bool(true) and any(set(true) <= set(group) <= same for group in families for same in alike)
 
 
-def _left_open(answer: dict[str, Any], alike: frozenset[str]) -> set[str]:
+def _left_open(answer: dict[str, Any], alike: Sequence[frozenset[str]]) -> set[str]:
     """Effects whose family an answer states, and of whose laws it leaves open only those that no record of the machine separates."""
     stated = (set(one["laws"]) for one in answer.get("families", ()) if one["probability"] >= SURE)
-    return {name for laws in stated if laws <= alike for name in laws}
+    return {name for laws in stated if any(laws <= same for same in alike) for name in laws}
 
 
 def _declared(name: str, families: tuple[tuple[str, ...], ...], catalogue: Catalogue) -> set[str]:
