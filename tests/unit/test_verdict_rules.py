@@ -17,11 +17,9 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
     law = supposed("free_force_of_position", predicted(0.01), "free_map")
     mass = supposed("inertia.mass", predicted(0.01), "freed_value")
     pair = [supposed(name, predicted(0.1, 700.0, seed=i)) for i, name in enumerate("ab")]
-    left = contest(NOMINAL, friction(0.6), maps={"velocity": predicted(1e-4)})
     cases = {
         "none_yet": replace(contest(NOMINAL, maps={"velocity": predicted(0.1)}), cut_short=True),
         "not_searched": replace(contest(NOMINAL), cut_short=True, structured=0.5),
-        "more_to_try": replace(left, cut_short=True),
         "unnamed_remainder": contest(NOMINAL, maps={"velocity": predicted(0.1)}),
         "missed": contest(supposed("", predicted((0.5 * SIZE) ** 2))),
         "structured": replace(contest(NOMINAL), structured=1.0),
@@ -34,7 +32,6 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
         "nothing_missing": contest(NOMINAL),
         "freed_value": contest(NOMINAL, mass),
         "longer_delay": contest(NOMINAL, late),
-        "mostly_left": left,
         "one_law": contest(NOMINAL, law),
         "other_place": contest(NOMINAL, moved),
         "astray": replace(contest(NOMINAL, friction()), follows=0.05),

@@ -209,22 +209,6 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         lambda found: float(found.delay_alone),
     ),
     VerdictRule(
-        "more_to_try",
-        "the budget ended the search: share of the mismatch that the effects leave and something else predicts",
-        1.0 - MAINLY,
-        "undecided",
-        "the budget ended the search, and the effects found so far leave {left:.0f} % of the mismatch, which depends on {goes_with}",
-        _of_search(lambda found: found.left, True),
-    ),
-    VerdictRule(
-        "mostly_left",
-        "share of the mismatch that the effects leave and something else predicts",
-        1.0 - MAINLY,
-        "unknown_physics",
-        "the named effects leave {left:.0f} % of the mismatch, which depends on {goes_with}",
-        lambda found: found.left,
-    ),
-    VerdictRule(
         "one_law",
         "a free function in the place of several effects is chosen (1)",
         0.0,
@@ -272,7 +256,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "share of the mismatch that the effects leave and something else predicts, where the budget did not end the search",
         1.0 - EXPLAINED_BY_NAMES,
         "unknown_physics",
-        "this effect is mainly what is missing, but {left:.0f} % of the mismatch is left and depends on {goes_with}",
+        "the named effects leave {left:.0f} % of the mismatch, which depends on {goes_with}",
         _of_search(lambda found: found.left, False),
     ),
     VerdictRule(
