@@ -83,14 +83,17 @@ class Heading:
 
 
 def heading_of(column: str) -> Heading:
-    """Parse the heading `column`: a unit in brackets, after a slash, as a suffix after an underscore or with a
-    capital, directly after a name that it suits, or as a word of the name."""
+    """Parse the heading `column`: a unit in brackets, after a slash, a quotient of units as its last word, a suffix
+    after an underscore or with a capital, directly after a name that it suits, or as a word of the name."""
     column = column.strip()
     if column.lower() in COUNTERS and (known := unit_of(column)) is not None:
         return Heading(column, *known, column)
     for pattern in (_BRACKETS, _SLASH):
         if (match := pattern.match(column)) and (known := unit_of(match[2])) is not None:
             return Heading(match[1].strip() or column, *known, match[2])
+    last = re.split(r"[\s_.]", column)[-1]
+    if "/" in last and (known := unit_of(last)) is not None:
+        return Heading(column[: -len(last)].strip(" _.") or column, *known, last)
     suffix = _glued(column)
     if suffix and (known := unit_of(_spelled(suffix))) is not None:
         return Heading(column[: -len(suffix)], *known, column[-len(suffix) :])
