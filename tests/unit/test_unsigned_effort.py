@@ -7,11 +7,15 @@ import pytest
 from legged import TWO_LINKS
 
 from rhythmid.body.machine import Machine
+from rhythmid.diagnose.admission import admitted
 from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.model import Model
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.joint_record import JointSignals, load_joint_records
+from rhythmid.record.read import read_record
+from rhythmid.record.signals import Signals
 from rhythmid.record.unsigned import WHY, is_unsigned, unsigned_joints
 from rhythmid.start.robot import start_robot
 from rhythmid.start.start import guess
@@ -120,3 +124,29 @@ def test_check_and_diagnose_of_a_robot_say_in_the_same_words_that_efforts_have_n
     assert f"one, two: {said}" in quality_report(arm, signals).notes
     with pytest.raises(InputError, match=f"no joint can be judged: one, two: {said}"):
         diagnose_machine(records, Machine.load(model))
+
+
+SIGN = np.tanh(SPEED / 0.05)
+DUTY = 20.0 * SPEED + 3.0 * SIGN + 0.3 * NOISE  # of a motor with friction, whose direction is another signal
+
+
+def test_the_size_of_a_duty_beside_a_speed_is_unsigned_and_one_about_a_middle_is_not() -> None:
+    assert is_unsigned(TIME, SPEED, np.abs(DUTY), is_speed=True)
+    assert not is_unsigned(TIME, SPEED, DUTY, is_speed=True)
+    assert not is_unsigned(TIME, SPEED, 127.0 + DUTY, is_speed=True)
+
+
+def test_init_check_and_diagnose_say_that_a_duty_beside_a_speed_has_no_sign(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    columns = np.column_stack([TIME, SPEED, np.abs(DUTY)])
+    np.savetxt(path, columns, delimiter=",", header="t,speed [rad/s],pwm", comments="", fmt="%.6g")
+    found = guess(path)
+    (said,) = [line for line in found.lines() if WHY in line]
+    assert said == f"CHECK input: {WHY}"
+    signals = tmp_path / "signals.yaml"
+    signals.write_text(found.signals)
+    assert f"input: {WHY}" in quality_report(path, signals).notes
+    model = Model.from_text(
+        "units: {force: '1', position: rad}\ninertia: {mass: 1.0}\nforce: [viscous_damper: {damping: 20.0}]"
+    )
+    assert f"run: input: {WHY}" in admitted([read_record(path, Signals.load(signals))], [], model).notes

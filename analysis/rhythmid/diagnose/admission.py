@@ -21,6 +21,7 @@ from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.output_copy import copy_notes
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.record import Record
+from rhythmid.record.unsigned import unsigned_notes
 
 Array = NDArray[np.float64]
 DECAYS = 0.7  # ratio of the motion's size in the last quarter to that in the first; above it the motion may be driven
@@ -60,7 +61,11 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
         remark,
         *still,
         *still_too,
-        *(f"{one.name}: {note}" for one in whole for note in (*punctuality_notes(one.run), *copy_notes(one))),
+        *(
+            f"{one.name}: {note}"
+            for one in whole
+            for note in (*punctuality_notes(one.run), *copy_notes(one), *unsigned_notes(one))
+        ),
         *(note for one in clean for note in one.notes),
         *(drive_of(one.record, b) for one, b in zip(clean, given)),
         *early_outputs(given),

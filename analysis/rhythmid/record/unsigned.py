@@ -33,7 +33,12 @@ WHY = (
 
 def unsigned_notes(record: Record) -> list[str]:
     """A line on each effort of a record that was recorded without its sign."""
-    if record.output_kind != "position":
+    return [f"{role}: {WHY}" for role in unsigned_roles(record)]
+
+
+def unsigned_roles(record: Record) -> list[str]:
+    """The roles of the efforts of a record that were recorded without their sign."""
+    if record.output_kind == "acceleration":
         return []
     output, found = record.output, list[str]()
     asked = _asked(record)
@@ -41,8 +46,8 @@ def unsigned_notes(record: Record) -> list[str]:
         if channel is None or (role == "input" and record.input_kind != "force"):
             continue
         at_once = np.interp(output.time, channel.time, channel.value)
-        if is_unsigned(output.time, output.value, at_once, asked):
-            found.append(f"{role}: {WHY}")
+        if is_unsigned(output.time, output.value, at_once, asked, record.output_kind == "velocity"):
+            found.append(role)
     return found
 
 
@@ -66,13 +71,20 @@ def _asked(record: Record) -> Array | None:
     return np.interp(record.output.time, record.input.time, record.input.value)
 
 
-def is_unsigned(time: Array, position: Array, effort: Array, reference: Array | None = None) -> bool:
-    """Whether an effort (n,) is that of a motion (n,) without its sign; `reference` (n,) is what a controller was asked for."""
-    if len(time) < LEAST_SAMPLES or not np.isfinite(position).all() or not np.isfinite(effort).all():
+def is_unsigned(
+    time: Array, motion: Array, effort: Array, reference: Array | None = None, is_speed: bool = False
+) -> bool:
+    """Whether an effort (n,) is that of a motion (n,) without its sign.
+
+    `reference` (n,) is what a controller was asked for. The motion is a position, or `is_speed`; of a speed no force of the position
+    is known.
+    """
+    if len(time) < LEAST_SAMPLES or not np.isfinite(motion).all() or not np.isfinite(effort).all():
         return False
     if effort.min() < 0.0 < effort.max() or np.ptp(effort) == 0.0:
         return False
-    speed = np.gradient(_mean(position), time)
+    speed = _mean(motion) if is_speed else np.gradient(_mean(motion), time)
+    position = np.zeros(len(time)) if is_speed else motion
     least = SLOW * float(np.quantile(np.abs(speed), 0.95))
     if least == 0.0 or min(np.mean(speed > least), np.mean(speed < -least)) < EACH_WAY:
         return False
@@ -81,8 +93,8 @@ def is_unsigned(time: Array, position: Array, effort: Array, reference: Array | 
     terms = np.column_stack([np.ones(len(time)), position - position.mean(), speed, way, acceleration])
     signs = [way, acceleration, position - position.mean()]
     if reference is not None and np.isfinite(reference).all():
-        terms = np.column_stack([terms, reference - position])
-        signs.append(reference - position)
+        terms = np.column_stack([terms, reference - motion])
+        signs.append(reference - motion)
     signed = _left(effort, _law(terms, effort))
     signed = min(signed, _left(np.abs(effort), _one_sided(terms, np.abs(effort))))
     sizes = _left(effort, _law(np.column_stack([terms[:, :2], np.abs(terms[:, 2:])]), effort))

@@ -18,6 +18,7 @@ from rhythmid.record.record import Record
 from rhythmid.record.rest_at_ends import rests_of, use_line
 from rhythmid.record.signals import Clock, Signals
 from rhythmid.record.standstill import standstill
+from rhythmid.record.unsigned import WHY, unsigned_roles
 from rhythmid.start.correction import corrected
 from rhythmid.start.force_unit import MODELLED
 from rhythmid.start.free_parts import free_parts
@@ -169,6 +170,11 @@ def guess(
         output = roles.choices["output"]
         output = replace(output, doubts=(*output.doubts, *doubts))
         roles = replace(roles, choices={**roles.choices, "output": output})
+    unsigned = {role: roles.choices[role] for role in unsigned_roles(clean) if role in roles.choices}
+    if unsigned:
+        told = {role: replace(one, doubts=(*one.doubts, WHY)) for role, one in unsigned.items()}
+        roles = replace(roles, choices={**roles.choices, **told})
+    if doubts or unsigned:
         text = signals_yaml(found, roles, _units(roles), clock, reason, maybe=use_line(clean))
     return Guess(found, roles, text, clock, reason, still is None)
 
