@@ -163,3 +163,25 @@ def test_positions_that_lie_far_apart_are_told_and_others_are_not():
     first, near, far = decays(nominal(), {"first": 0.0, "near": 0.4, "far": 9.0})
     (note,) = separate_zeros_notes([first, near, far])
     assert note.startswith("the output of far is between ") and "offset:" in note
+
+
+def test_a_machine_that_nothing_restores_and_that_never_comes_back_has_no_zero(monkeypatch):
+    """Where it begins says the same as a zero; an end stop would take each place where a record ends for a zero."""
+    cart = Model.from_text(
+        "units: {force: rad/s^2, position: rad}\ninertia: {mass: {value: 1.0, fixed: true}}\n"
+        "force: [{viscous_damper: {damping: {value: 0.3}}}]",
+        catalogue=CATALOGUE,
+    )
+    time = 0.02 * np.arange(500)
+    runs = [
+        Record(name, Channel(time, zero + speed * (1.0 - np.exp(-0.3 * time)) / 0.3, "rad"))
+        for (name, zero), speed in zip(ZEROS.items(), (1.0, 1.5, 2.0), strict=True)
+    ]
+    series, unseen = hold_out_tail(prepare(runs))
+    plain = calibrate(cart, series, CATALOGUE)
+
+    def looked_for(*_: object) -> None:
+        raise AssertionError("a zero is looked for")
+
+    monkeypatch.setattr("rhythmid.diagnose.record_zeros.Seen.of", looked_for)
+    assert with_zeros(plain, cart, unseen, CATALOGUE) == (plain, unseen)

@@ -4,7 +4,8 @@ A zero of each record is a hypothesis like any other. It is not missing physics,
 stiffness, the mean of a motion shifts with its amplitude. The zeros are therefore adopted, for all hypotheses alike, only if they
 predict data that the fit has not seen decisively better, both beside the nominal model and beside the effect of the catalogue that
 explains the records best. The model with both must also follow the machine: a zero is a calibration, and must not compensate for a
-machine that has changed from record to record.
+machine that has changed from record to record. Where nothing restores the position, and the motion never comes back, a zero
+is a position at which the record begins.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,6 +19,7 @@ from rhythmid.diagnose.calibration_evidence import Seen
 from rhythmid.diagnose.constants import FOLLOWS
 from rhythmid.diagnose.free_functions import FreeFunction
 from rhythmid.diagnose.search.forward import search
+from rhythmid.diagnose.search.restoring_force import is_restored
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit, estimate, rerun
@@ -54,6 +56,8 @@ def with_zeros(
     """
     fit, series, kept = calibration.fit, calibration.series, (calibration, list(unseen))
     if len({record_of(one) for one in series}) < 2 or series[0].measured != "position":
+        return kept
+    if not (scales(series, fit.model).comes_back or is_restored(fit)):
         return kept
     alone = Seen.of(fit, pool)
     if not alone.needs(alone.extended(_zero_of_each(alone.fit)), alone.base):

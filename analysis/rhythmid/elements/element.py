@@ -86,8 +86,8 @@ class Parameter:
     turn: float = inf
 
 
-# changes of the drive that show whether what it passes through changes with time: one tells how it is, two that it is
-# no longer the same
+# changes of the drive in the same direction that show whether what it passes through changes with time: one tells how it
+# is, two that it is no longer the same
 OFTEN_ENOUGH = 2
 
 
@@ -116,11 +116,14 @@ class Scales:
     rest: float | None = None  # position at which the model's linear spring is at rest, where that is known
     displaced_base: bool = False  # whether the input displaces the base that the leg stands on
     idle: bool = False  # whether no command, forcing or controller drives the machine: it moves freely
-    # times at which the recorded drive changes in one record, at most `OFTEN_ENOUGH`: 0 for another level in each
+    # times at which the recorded drive changes in the same direction in one record, at most `OFTEN_ENOUGH`: 0 for another level in each
     # record, 1 for a step with which the records begin
     changes: int = OFTEN_ENOUGH
     swings: tuple[float, float] = (0.0, 0.0)  # [Hz] lowest and highest frequency of a free oscillation
     comes_back: bool = True  # whether the position moves back and forth in some record
+    pressed: bool = (
+        True  # whether the machine is held at an end of its travel against its drive in some record
+    )
     once: bool = False  # whether every record passes through each of its speeds only once, as a machine that coasts down
     # smallest, mean and largest value and standard deviation of what the sensor measures, where that is not the position of
     # the mass that the forces act on: its speed, or its position beside that relative to a moving base
@@ -174,7 +177,8 @@ class Element:
     `confusable` maps another element's name to an experiment or property that distinguishes the two. A `rotational`
     effect needs an angle for x, a `controlled` one a controller in the model, one of a `displaced_base` an input
     that moves the base. A `reversing` one is told from dry friction by what follows a reversal of the motion alone. A `placed`
-    one changes with the position by a slow law, as every stiffness does. `ranges` limits parameters, by the record's scales, to values for which the element's name
+    one changes with the position by a slow law, as every stiffness does. One that `stops` the machine at a place is told from
+    friction where it throws the machine back or its drive presses it on. `ranges` limits parameters, by the record's scales, to values for which the element's name
     applies: a ripple repeats within the travel, otherwise it is only another spring. `hops` is the largest distance
     of the local minima of a fit in a parameter. `needless_with` names elements, or as "element.parameter" estimated
     parameters, beside which this element adds nothing to another candidate or to the nominal model. `against` says
@@ -228,6 +232,7 @@ class Element:
     moving_as: Callable[..., tuple[tuple[str, float], ...]] | None = None
     reversing: bool = False  # is told from dry friction by the way after a reversal of the motion alone
     placed: bool = False  # follows a slow law of the position, though it is no stiffness
+    stops: bool = False  # stops the machine at a place, as friction does anywhere
     # changes with time what the drive passes through: a gain that fades, a clock, a delay
     drifts: bool = False
     starts: Callable[[Scales], list[dict[str, float]]] | None = None

@@ -14,6 +14,7 @@ from rhythmid.identify.series import Series, displacement, dominant_frequency, r
 from rhythmid.identify.swing_frequency import swing_frequencies
 from rhythmid.model import Model
 from rhythmid.record.back_and_forth import some_record_comes_back
+from rhythmid.record.pressed import some_part_is_pressed
 
 Array = NDArray[np.float64]
 REST_LENGTH = "linear_spring.rest_length"
@@ -55,6 +56,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         changes=_changes(series, model),
         swings=(0.0, 0.0) if drive.acts else swing_frequencies(series),
         comes_back=some_record_comes_back((record_of(one), place) for one, place in zip(series, places)),
+        pressed=some_part_is_pressed((x, v, one.average(one.drive)) for one, (x, v) in zip(series, motions)),
         once=all(_once(v) for _, v in motions),
         signal=_signal(series),
     )
@@ -115,12 +117,13 @@ def _signal(series: Sequence[Series]) -> tuple[float, float, float, float]:
 
 
 def _changes(series: Sequence[Series], model: Model) -> int:
-    """Times at which the drive changes in one record, at most `OFTEN_ENOUGH`; the model's own forcing changes often."""
+    """Times at which the drive changes in one direction in one record, at most `OFTEN_ENOUGH`; the model's own forcing changes often."""
     if any(term.element.acts == "drive" for term in model.terms):
         return OFTEN_ENOUGH
-    found = Counter[str]()
+    found = Counter[tuple[str, int]]()
     for one in series:
-        found[one.record or one.name] += one.changes
+        for direction, count in enumerate(one.changes):
+            found[one.record or one.name, direction] += count
     return min(max(found.values(), default=0), OFTEN_ENOUGH)
 
 

@@ -13,6 +13,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import PPoly
 
 from rhythmid.errors import InputError
+from rhythmid.identify.drive_changes import rises_and_falls
 from rhythmid.identify.initial_step import HISTORY, stepped, value_before
 from rhythmid.identify.inputs import Inputs, Pieces
 from rhythmid.identify.motion_band import block_length, moving_part
@@ -104,9 +105,10 @@ class Series:
         return told
 
     @property
-    def changes(self) -> int:
-        """Number of samples at which command or forcing differ from the sample before."""
-        return sum(int(np.count_nonzero(np.diff(one))) for one in (self._commands, self._told(self.forcing)))
+    def changes(self) -> tuple[int, int]:
+        """Number of times at which command or forcing rise, and at which they fall."""
+        both = rises_and_falls(self._commands), rises_and_falls(self._told(self.forcing))
+        return both[0][0] + both[1][0], both[0][1] + both[1][1]
 
     @cached_property
     def driven(self) -> bool:

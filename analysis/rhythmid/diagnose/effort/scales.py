@@ -11,6 +11,7 @@ from rhythmid.identify.position_lines import lines_below
 from rhythmid.identify.record_scales import NO_SPRING, REST_LENGTH
 from rhythmid.model import Model
 from rhythmid.record.back_and_forth import some_record_comes_back
+from rhythmid.record.pressed import some_part_is_pressed
 
 
 def scales_at(balance: Balance, fit: EffortFit) -> Scales:
@@ -49,4 +50,5 @@ def scales_of(balance: Balance, model: Model) -> Scales:
         rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
         displaced_base=any(motion.driven_by_base for motion in motions),
         comes_back=some_record_comes_back((one.record, one.leg_position) for one in motions),
+        pressed=some_part_is_pressed((one.leg_position, one.leg_velocity, one.effort) for one in motions),
     )

@@ -57,6 +57,7 @@ ELEMENT = Element(
     acts="body",
     size="stiffness",
     rigid=True,
+    stops=True,
     starts=starts,
     ranges=lambda s: {"position": (s.low, s.high)},
     also_known_as=("bump stop", "hard stop", "impact"),
