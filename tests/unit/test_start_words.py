@@ -229,3 +229,14 @@ def test_the_letter_of_an_array_of_named_signals_tells_nothing():
 )
 def test_the_last_word_for_an_effort_says_its_unit(name, unit):
     assert force_unit_of(Recorded(name, TIME, FORCE, column=name)) == unit
+
+
+@pytest.mark.parametrize("name", ["Entrada", "Estímulo", "Ingresso", "entrée", "Eingang"])
+def test_a_column_called_an_input_in_another_language_drives(name: str, tmp_path: Path) -> None:
+    time = 0.02 * np.arange(600)
+    drive = np.where(time % 8.0 < 3.0, 2.0, 0.0)
+    place = np.cumsum(np.cumsum(drive - 0.5)) * 4e-4
+    path = tmp_path / "run.csv"
+    columns = np.column_stack([time, drive, place])
+    np.savetxt(path, columns, delimiter=",", header=f"t,{name},posicion", comments="", encoding="utf-8")
+    assert guess(path).roles.choices["input"].recorded.said == name

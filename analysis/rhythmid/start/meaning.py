@@ -78,7 +78,7 @@ BASE = frozenset(
 )
 SHAKEN = frozenset("excitation exc shaking vibration".split())  # words for a motion of the base
 # driving signals, where no quantity is stated
-DRIVING = frozenset("input in stimulus ctrl control drive".split())
+DRIVING = frozenset("input in stimulus ctrl control drive entrada estimulo ingresso entree eingang".split())
 FORCES = frozenset("force forces wrench".split())  # of a contact as well as of an actuator
 GENERIC = frozenset(
     "dof joint joints motor data robot array value values actuator axis trajectory controller controllers in out input output".split()
