@@ -16,6 +16,7 @@ from rhythmid.identify.early_output import early_outputs
 from rhythmid.identify.moving import moving
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
+from rhythmid.record.braking import braking_notes
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.output_copy import copy_notes
@@ -64,7 +65,12 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
         *(
             f"{one.name}: {note}"
             for one in whole
-            for note in (*punctuality_notes(one.run), *copy_notes(one), *unsigned_notes(one))
+            for note in (
+                *punctuality_notes(one.run),
+                *copy_notes(one),
+                *unsigned_notes(one),
+                *braking_notes(one),
+            )
         ),
         *(note for one in clean for note in one.notes),
         *(drive_of(one.record, b) for one, b in zip(clean, given)),

@@ -13,6 +13,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.angle_wrap import wrap_notes
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block
+from rhythmid.record.braking import braking_notes
 from rhythmid.record.cleaning import LeftOut, cleaned, peak_note, placeholder_notes
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.folder_of_tables import size_of
@@ -276,7 +277,9 @@ def _of_channels(parts: Mapping[str, Record], left_out: Mapping[str, tuple[LeftO
     """Notes on the channels of each part, with its joints, and for joints on what is left out of their outputs; what
     is told of the channels of all parts alike concerns the recording."""
     said = {begin: one.quality.notes for begin, one in parts.items()}
-    own = {begin: [*copy_notes(one), *unsigned_notes(one)] for begin, one in parts.items()}
+    own = {
+        begin: [*copy_notes(one), *unsigned_notes(one), *braking_notes(one)] for begin, one in parts.items()
+    }
     if "" in parts:
         return [*said[""], *own[""]]
     for begin, one in parts.items():

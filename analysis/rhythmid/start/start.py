@@ -11,6 +11,8 @@ from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.record.angle_wrap import unwrapped, wraps_of
+from rhythmid.record.braking import WHY as TAKES_ENERGY
+from rhythmid.record.braking import braking_roles
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.inventory import Inventory, inventory
 from rhythmid.record.read import load_records, read_record
@@ -18,7 +20,8 @@ from rhythmid.record.record import Record
 from rhythmid.record.rest_at_ends import rests_of, use_line
 from rhythmid.record.signals import Clock, Signals
 from rhythmid.record.standstill import standstill
-from rhythmid.record.unsigned import WHY, unsigned_roles
+from rhythmid.record.unsigned import WHY as WITHOUT_SIGN
+from rhythmid.record.unsigned import unsigned_roles
 from rhythmid.start.correction import corrected
 from rhythmid.start.force_unit import MODELLED
 from rhythmid.start.free_parts import free_parts
@@ -170,10 +173,8 @@ def guess(
         output = roles.choices["output"]
         output = replace(output, doubts=(*output.doubts, *doubts))
         roles = replace(roles, choices={**roles.choices, "output": output})
-    unsigned = {role: roles.choices[role] for role in unsigned_roles(clean) if role in roles.choices}
-    if unsigned:
-        told = {role: replace(one, doubts=(*one.doubts, WHY)) for role, one in unsigned.items()}
-        roles = replace(roles, choices={**roles.choices, **told})
+    if unsigned := unsigned_roles(clean):
+        roles = _doubted_of(roles, unsigned, WITHOUT_SIGN)
     if doubts or unsigned:
         text = signals_yaml(found, roles, _units(roles), clock, reason, maybe=use_line(clean))
     return Guess(found, roles, text, clock, reason, still is None)
@@ -298,6 +299,8 @@ def start(
             nominal = tried(roles)
     if roles is not guessed.roles:
         guessed = guessed.changed(roles, use)
+    if braking := braking_roles(read_record(moving[0], Signals.from_text(guessed.signals, GUESSED))):
+        guessed = guessed.changed(_doubted_of(guessed.roles, braking, TAKES_ENERGY), use)
     units = _units(roles)
     text = model_yaml(nominal, guessed.roles, units, units not in (TRANSLATIONAL, ROTATIONAL))
     Model.from_text(text, "model.yaml", known)
@@ -313,6 +316,18 @@ def _doubted(roles: Roles, doubts: Sequence[str]) -> Roles:
     output = roles.choices["output"]
     return replace(
         roles, choices={**roles.choices, "output": replace(output, doubts=(*output.doubts, *doubts))}
+    )
+
+
+def _doubted_of(roles: Roles, told: Sequence[str], doubt: str) -> Roles:
+    """The roles with a doubt about what drives the machine in those that are `told`."""
+    known = {role: roles.choices[role] for role in told if role in roles.choices}
+    return replace(
+        roles,
+        choices={
+            **roles.choices,
+            **{role: replace(one, doubts=(*one.doubts, doubt)) for role, one in known.items()},
+        },
     )
 
 
