@@ -20,7 +20,9 @@ NOISE = np.random.default_rng(3).standard_normal(len(TIME))
 PLACE = np.sin(2.0 * TIME) + 0.6 * np.sin(3.3 * TIME + 1.0)
 SPEED = np.gradient(PLACE, TIME)
 ACCELERATION = np.gradient(SPEED, TIME)
-DAMPER = 4.0 * SPEED + 2.0 * np.tanh(SPEED / 0.05) + 0.1 * NOISE  # force on a damper that a test machine moves
+DAMPER = (
+    4.0 * SPEED + 2.0 * np.tanh(SPEED / 0.05) + 0.1 * NOISE
+)  # force on a damper that a test machine moves
 
 
 def test_the_force_that_a_damper_exerts_takes_energy_and_the_one_on_it_does_not() -> None:

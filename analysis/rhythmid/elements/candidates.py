@@ -14,7 +14,7 @@ IDLE = "no command, forcing or controller drives the machine"
 # along such a motion the way before sliding is a spring from wherever the record begins, and with a state of its own in each
 # window a constant force of each
 NEVER_REVERSED = "the motion never comes back, and without reversals nothing but the first way shows what it does before it slides"
-STEADY = "the drive changes at most once in each direction in each record, which does not show that its effect changes with time"
+STEADY = "the drive passes through each level only once in the same direction in each record, which does not show that its effect changes with time"
 ONE_WAY = "nothing in the model restores the position, and the motion never comes back, so that a force of the position is not told from one of the speed or the time"
 UNPRESSED = "the motion never comes back, and nothing drives it on where it rests, so that a stop is not told from friction"
 DYING = "nothing drives the motion, and it meets each speed once, so that a law of the time or the past is not told from one of the speed"
@@ -126,7 +126,7 @@ def _untold_by_levels(element: Element, setting: Setting, scales: Scales) -> str
     """Reason why a drive that is constant in each record, or only begins with it, does not show an element.
 
     Its levels show static laws of the actuator. A delay, lag or memory shows where the drive changes, and a change of
-    gain, delay or clock with time where it changes twice in the same direction. A controller's output changes all the
+    gain, delay or clock with time where it does the same twice. A controller's output changes all the
     time, but not its reference.
     """
     dynamic = element.slot in ("command", "timing") or (

@@ -86,8 +86,8 @@ class Parameter:
     turn: float = inf
 
 
-# changes of the drive in the same direction that show whether what it passes through changes with time: one tells how it
-# is, two that it is no longer the same
+# changes of the drive through the same level in the same direction that show whether what it passes through changes with
+# time: one tells how it is, two that it is no longer the same
 OFTEN_ENOUGH = 2
 
 
@@ -116,7 +116,7 @@ class Scales:
     rest: float | None = None  # position at which the model's linear spring is at rest, where that is known
     displaced_base: bool = False  # whether the input displaces the base that the leg stands on
     idle: bool = False  # whether no command, forcing or controller drives the machine: it moves freely
-    # times at which the recorded drive changes in the same direction in one record, at most `OFTEN_ENOUGH`: 0 for another level in each
+    # times at which the recorded drive passes through one level in the same direction in one record, at most `OFTEN_ENOUGH`: 0 for another level in each
     # record, 1 for a step with which the records begin
     changes: int = OFTEN_ENOUGH
     swings: tuple[float, float] = (0.0, 0.0)  # [Hz] lowest and highest frequency of a free oscillation

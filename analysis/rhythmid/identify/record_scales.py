@@ -1,7 +1,6 @@
 """Scales of the records: size and speed of the motion, and the driving signals. They scale first guesses of
 parameters."""
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from rhythmid.elements.element import OFTEN_ENOUGH, Scales
+from rhythmid.identify.drive_changes import most_repeated
 from rhythmid.identify.series import Series, displacement, dominant_frequency, record_of
 from rhythmid.identify.swing_frequency import swing_frequencies
 from rhythmid.model import Model
@@ -117,14 +117,14 @@ def _signal(series: Sequence[Series]) -> tuple[float, float, float, float]:
 
 
 def _changes(series: Sequence[Series], model: Model) -> int:
-    """Times at which the drive changes in one direction in one record, at most `OFTEN_ENOUGH`; the model's own forcing changes often."""
+    """Times at which the drive does the same in one record, at most `OFTEN_ENOUGH`; the model's own forcing does it often."""
     if any(term.element.acts == "drive" for term in model.terms):
         return OFTEN_ENOUGH
-    found = Counter[tuple[str, int]]()
-    for one in series:
-        for direction, count in enumerate(one.changes):
-            found[one.record or one.name, direction] += count
-    return min(max(found.values(), default=0), OFTEN_ENOUGH)
+    found = [
+        most_repeated((record_of(one), *one.channels[number]) for one in series)
+        for number in range(len(series[0].channels))
+    ]
+    return min(max(found), OFTEN_ENOUGH)
 
 
 def _place(series: Series, motion: Array) -> Array:

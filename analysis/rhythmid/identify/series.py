@@ -13,7 +13,6 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import PPoly
 
 from rhythmid.errors import InputError
-from rhythmid.identify.drive_changes import rises_and_falls
 from rhythmid.identify.initial_step import HISTORY, stepped, value_before
 from rhythmid.identify.inputs import Inputs, Pieces
 from rhythmid.identify.motion_band import block_length, moving_part
@@ -105,10 +104,10 @@ class Series:
         return told
 
     @property
-    def changes(self) -> tuple[int, int]:
-        """Number of times at which command or forcing rise, and at which they fall."""
-        both = rises_and_falls(self._commands), rises_and_falls(self._told(self.forcing))
-        return both[0][0] + both[1][0], both[0][1] + both[1][1]
+    def channels(self) -> tuple[tuple[Array, bool], ...]:
+        """Command and forcing at the samples (n,) or (n + 1,), and whether each is held between its samples."""
+        both = (self.command, self._commands), (self.forcing, self._told(self.forcing))
+        return tuple((told, signal is None or is_held(signal)) for signal, told in both)
 
     @cached_property
     def driven(self) -> bool:

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rhythmid.elements.element import Scales
+from rhythmid.elements.element import OFTEN_ENOUGH, Scales
+from rhythmid.identify.drive_changes import most_repeated
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
 from rhythmid.identify.position_lines import lines_below
@@ -50,5 +51,6 @@ def scales_of(balance: Balance, model: Model) -> Scales:
         rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
         displaced_base=any(motion.driven_by_base for motion in motions),
         comes_back=some_record_comes_back((one.record, one.leg_position) for one in motions),
+        changes=min(most_repeated((one.record, one.effort, False) for one in motions), OFTEN_ENOUGH),
         pressed=some_part_is_pressed((one.leg_position, one.leg_velocity, one.effort) for one in motions),
     )
