@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.identify.free_run import FreeRun
+from rhythmid.identify.covariance import covariance_of
+from rhythmid.identify.free_run import FreeRun, with_series
 from rhythmid.identify.output_error import Fit
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.model import Model
@@ -44,18 +45,25 @@ def _block_averages(run: FreeRun, index: int, model: Model, start: Array) -> Arr
     every = replace(
         one, block=1, time=times, value=np.zeros(len(times)), used=np.ones(len(times), bool), hidden=None
     )
-    series = (*run.series[:index], every, *run.series[index + 1 :])
-    rows = replace(run, series=series, max_step=0.5 * run.max_step).rows(model, index, start)
+    fine = with_series(
+        run, index, every
+    )  # steps end at the knots of a command that a smooth surrogate may replace
+    rows = replace(fine, max_step=0.5 * run.max_step).rows(model, index, start)
     return None if rows is None else rows[1:, run.states].reshape(-1, one.block).mean(axis=1)
 
 
 def with_discretisation_error(fit: Fit) -> Fit:
-    """The fit with the discretisation error added to its covariance."""
-    known = np.isfinite(np.diag(fit.covariance))
+    """The fit with the discretisation error added to its covariance.
+
+    The estimator that the error passes through is that of the information: standard deviations that block scores
+    have widened describe how much the estimates scatter, not how they follow the outputs.
+    """
+    jacobian = fit.linearisation.jacobian
+    inverse = covariance_of(jacobian, [fit.model.parameters[name].prior for name in fit.names])
+    known = np.isfinite(np.diag(inverse)) & np.isfinite(np.diag(fit.covariance))
     if not known.any():
         return fit
+    moved = inverse[np.ix_(known, known)] @ (jacobian[:, known].T @ discretisation_error(fit))
     covariance = fit.covariance.copy()
-    block = covariance[np.ix_(known, known)]
-    moved = block @ (fit.linearisation.jacobian[:, known].T @ discretisation_error(fit))
-    covariance[np.ix_(known, known)] = block + np.outer(moved, moved)
+    covariance[np.ix_(known, known)] += np.outer(moved, moved)
     return replace(fit, covariance=covariance)
