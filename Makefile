@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 
 PACKAGES := analysis $(patsubst %/setup.py,%,$(wildcard ros_ws/src/*/setup.py))
-METADATA := $(wildcard $(foreach package,$(PACKAGES),$(addprefix $(package)/,*.py *.cfg *.toml *.xml launch/* config/* layouts/*)))
+METADATA := $(wildcard $(foreach package,$(PACKAGES),$(addprefix $(package)/,*.py *.cfg *.toml *.xml launch/* config/*.yaml layouts/*)))
 UPLOT    := analysis/rhythmid/report/vendor/uplot
 UPLOT_VERSION := 1.6.32
 

@@ -191,3 +191,19 @@ def test_the_manifests_name_all_that_their_packages_import():
             used &= set(ROSDEP)  # the others are extras
         missing = {ROSDEP.get(name, name) for name in used} - declared
         assert not missing, (folder.name, missing)
+
+
+def test_what_the_tour_writes_beside_the_experiments_is_not_installed(tmp_path):
+    """The tour of the README runs in the folder of the experiments; installing again has to work after it."""
+    source = tmp_path / "source"
+    shutil.copytree(
+        ROOT / "ros_ws" / "src" / "rhythmid_bringup", source,
+        ignore=shutil.ignore_patterns("*.egg-info", "build", "__pycache__", "out"),
+    )  # fmt: skip
+    (source / "config" / "out" / "hop").mkdir(parents=True)
+    install = ("setup.py", "--quiet", "install_data", "--install-dir", tmp_path / "installed")
+    run(sys.executable, "-W", "ignore", *install, cwd=source)
+    found = {
+        path.name for path in (tmp_path / "installed" / "share" / "rhythmid_bringup" / "config").iterdir()
+    }
+    assert "lockstep.yaml" in found and "out" not in found

@@ -15,7 +15,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/launch", glob("launch/*.py")),
-        (f"share/{NAME}/config", glob("config/*")),
+        (f"share/{NAME}/config", glob("config/*.yaml")),
         (f"share/{NAME}/layouts", glob("layouts/*")),
     ],
     install_requires=["setuptools", "PyYAML", "rich", "typer", "rhythmid", "rhythmid_nodes"],
