@@ -37,6 +37,7 @@ PARTS = (
     "joint_design",
     "machines",
     "model_line",
+    "narrow_help",
     "options",
     "terminal",
 )  # modules of `commands` that are not commands
@@ -75,8 +76,13 @@ def main() -> None:
         entry.load()(app)
     if RUN not in {entry.name for entry in entries}:
         app.command(name=RUN, context_settings={"ignore_unknown_options": True})(_run)
+    narrow = _narrow()
+    if narrow is not None:
+        from rhythmid.commands.narrow_help import use_narrow_help
+
+        use_narrow_help()
     try:
-        code = app(spread(sys.argv[1:]), prog_name=NAME, standalone_mode=False, terminal_width=_narrow())
+        code = app(spread(sys.argv[1:]), prog_name=NAME, standalone_mode=False, terminal_width=narrow)
     except InputError as error:
         _refuse(str(error))
     except (typer.Abort, KeyboardInterrupt):

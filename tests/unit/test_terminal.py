@@ -72,8 +72,9 @@ def test_help_on_a_narrow_terminal_cuts_nothing_off():
     assert "--clock-offset-std" in text and "…" not in text
 
 
-def test_the_help_is_no_wider_than_a_narrow_terminal():
-    text = python_m("--help", COLUMNS="40").stdout
+@pytest.mark.parametrize("command", ["", "identify", "design", "proof"])
+def test_the_help_is_no_wider_than_a_narrow_terminal(command):
+    text = python_m(*command.split(), "--help", COLUMNS="40").stdout
     assert max(map(len, text.splitlines())) <= 40
 
 
