@@ -18,7 +18,7 @@ from rhythmid.report.page import write_page
 CANDIDATES = {"coulomb_friction", "cubic_stiffness", "flight_damping", "sensor_lag"}
 SECTIONS = (
     "Where model and machine differ", "What is missing", "How much better it fits", "What is left unexplained",
-    "Harmonics of the cycle and transfer functions", "The hypotheses", "What is not believed, and why", "Parameters", "Delays", "What remains unknown",
+    "Harmonics of the cycle and transfer functions", "The hypotheses", "Rejected hypotheses, and why", "Parameters", "Delays", "What remains unknown",
     "The next experiment", "Calibration", "What was assumed",
     "Quality of the records", "How to reproduce this",
 )  # fmt: skip

@@ -53,7 +53,7 @@ def test_equal_lockstep_runs_give_equal_bytes_and_equal_the_run_without_ros(rhyt
         done = rhythmid("run", path, "--out", tmp_path / layout / "bag", "--report", page)
         assert done.returncode == 0, done.stderr
         told = page.read_text(encoding="utf-8")
-        assert "<h1>The run came to its end</h1>" in told and "/hopper/joint_states" in told
+        assert "<h1>The run finished</h1>" in told and "/hopper/joint_states" in told
         found.append({file.name: file.read_bytes() for file in (tmp_path / layout / "bag").iterdir()})
     assert set(found[0]) == set(found[1])
     for name, data in found[0].items():

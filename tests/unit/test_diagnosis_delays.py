@@ -50,3 +50,15 @@ def test_delays_of_which_only_the_sum_is_known_are_not_separable():
     found = delays_of(fit_with([[1e-4, -0.99999e-4], [-0.99999e-4, 1e-4]]))
     assert found["sum"]["std"] == pytest.approx(np.sqrt(2e-9))
     assert found["separable"] is False
+
+
+def test_a_model_with_one_delay_says_that_it_stands_for_both():
+    fit = fit_with([[4e-8, 0.0], [0.0, 9e-8]])
+    changed = {
+        "model": fit.model.without("measurement_delay"),
+        "names": NAMES[:1],
+        "run": SimpleNamespace(series=(SimpleNamespace(forcing=object()),)),
+    }
+    found = delays_of(cast(Fit, SimpleNamespace(**vars(fit) | changed)))
+    assert found["assumption"] == "the model has one delay, which stands for both"
+    assert found["separable"] is False and found["sum"] == found["input"]

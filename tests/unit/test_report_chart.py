@@ -9,6 +9,7 @@ import pytest
 from rhythmid.report.chart import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Chart, Curve, draw, linear_ticks
 from rhythmid.report.evidence_chart import Evidence, draw_evidence
 from rhythmid.report.row_chart import Bar, Change, draw_bars, draw_changes
+from rhythmid.report.run_chart import Point, draw_runs
 from rhythmid.report.signal_path import SlotContent, draw_signal_path
 from rhythmid.report.state_map import draw_maps, state_map
 
@@ -78,7 +79,6 @@ def test_texts_cannot_break_out_of_a_drawing() -> None:
                 evil,
                 evil,
                 (Curve(np.arange(3.0), np.arange(3.0), evil, "before"),),
-                levels=((1.0, evil),),
             )
         ),
         draw_bars(evil, [Bar(evil, 1.0, evil)], 0.5, evil),
@@ -157,3 +157,13 @@ def test_names_of_rows_do_not_touch_however_many_lines_they_need(kind: str) -> N
     assert [len(one) for one in lines] == [1, 3, 2, 1]
     for upper, lower in zip(lines, lines[1:], strict=False):
         assert lower[0] - upper[-1] >= 13.0
+
+
+def test_runs_are_counted_in_whole_numbers_and_times_are_not() -> None:
+    def ticks(places: tuple[float, ...]) -> list[str]:
+        points = [Point(place, 1.0 + place, 0.1, "A", "a run") for place in places]
+        svg = draw_runs("what it shows", "run", "N", points, 2.0)
+        return re.findall(rf'y="{HEIGHT - BOTTOM + 16:.1f}"[^>]*>([^<]+)<', svg)
+
+    assert ticks((1.0, 2.0, 3.0)) == ["1", "2", "3"]
+    assert "0.4" in ticks((0.1, 0.5, 1.2))

@@ -90,7 +90,7 @@ def test_the_diagnosis_shows_all_that_it_promises() -> None:
     html = render(diagnosis_page(findings(result())))
     for promised in (
         "Where model and machine differ", "What is missing", "How much better it fits", "What is left unexplained",
-        "Harmonics of the cycle", "The hypotheses", "What is not believed, and why", "What was assumed", "Parameters", "Delays", "What remains unknown", "The next experiment",
+        "Harmonics of the cycle", "The hypotheses", "Rejected hypotheses, and why", "What was assumed", "Parameters", "Delays", "What remains unknown", "The next experiment",
         "Calibration", "Quality of the records", "How to reproduce this", "What was not tried", "dwell at low speed",
         "the forcing acts undelayed", "1 (3 samples lost)", "rhythmid diagnose run 1", "friction force F<sub>c</sub>",
     ):  # fmt: skip

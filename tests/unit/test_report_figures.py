@@ -51,10 +51,8 @@ def test_the_phase_portrait_of_a_sine_is_an_ellipse_with_its_switch() -> None:
     x, v = chart.curves[0].x, chart.curves[0].y
     inner = slice(20, -20)
     assert (x / 10.0)[inner] ** 2 + (v / (20.0 * np.pi))[inner] ** 2 == pytest.approx(1.0, abs=0.02)
-    assert [place for place, _ in chart.uprights] == pytest.approx(
-        [2.0]
-    )  # one beyond the travel is not drawn
-    assert [speed for speed, _ in chart.levels] == [0.0]
+    assert chart.uprights == pytest.approx((2.0,))  # one beyond the travel is not drawn
+    assert chart.levels == (0.0,)
     assert "Damper" in portrait(switched, MOTION).caption
 
 
@@ -117,17 +115,19 @@ def test_worse_hypotheses_stand_further_to_the_right_and_near_ones_are_told_apar
     assert found == sorted(found) and found[1] - found[0] > 20.0 and found[-1] < 320.0
 
 
-def test_the_evidence_says_which_hypotheses_are_chosen_and_which_rejected() -> None:
+def test_the_evidence_says_which_hypotheses_are_chosen_equivalent_and_rejected() -> None:
     told = result()
     (chart,) = [
         b for b in hypotheses_section(findings(told)).blocks if getattr(b, "title", "").endswith("hypotheses")
     ]
     assert "Coulomb friction: predicts worse by 0" in chart.svg
-    assert (
-        "not believed: only a limit of its parameters is identifiable, where it is another effect"
-        in chart.svg
-    )
-    assert [label for _, label in chart.legend] == ["chosen", "not believed, see below", "less likely"]
+    assert "rejected: so small a part belongs to something else" in chart.svg
+    assert [label for _, label in chart.legend] == [
+        "chosen",
+        "as good as the chosen one",
+        "rejected, see below",
+        "less likely",
+    ]
     alone = findings(
         result("consistent") | {"hypotheses": [hypothesis("nominal", 0.0, 1.0, [])], "rejections": []}
     )

@@ -166,7 +166,7 @@ def test_an_identification_without_separable_delays_gives_the_sum_only() -> None
         "undetermined": ["both delays by opposite amounts"],
     }
     html = render(identification_page(told, "a model from run", (), "rhythmid identify run", {}))
-    assert "cannot tell the two delays apart" in html
+    assert "Use only the sum of the two delays" in html
     assert "late together" in html
     assert "between 0.00\u202fms and 35.00\u202fms" in html
     assert "both delays by opposite amounts" in html

@@ -112,7 +112,7 @@ def _copied(copies: Mapping[Task, Task]) -> list[Section]:
     if not copies:
         return []
     rows = tuple((task.name, original.name) for task, original in copies.items())
-    said = "They hold the same samples as another recording and tell nothing more: only that one is compared."
+    said = "They hold the same samples as another recording, so only that one is compared."
     return [
         Section(
             "Copies",
@@ -125,9 +125,9 @@ def _agreement(found: Sequence[Agreement]) -> list[Section]:
     if not found:
         return []
     lead = (
-        f"Shaded rows differ: with nothing but the stated noise, the chance of any shaded row on this page is at most {100 * LEVEL:g} %. "
-        "Run to run compares the runs of each rig with the intervals that they state; a significant ratio above 1 says that they are too small or that the machine changes. "
-        "Rig to rig compares the rigs with the scatter of their runs. The trend is the change over time within each rig."
+        f"A shaded row is a parameter that differs. If the runs differ only by the stated noise, the chance of any shaded row on this page is at most {100 * LEVEL:g} %. "
+        "Run to run: the ratio is the scatter of each rig's runs, divided by the scatter that their intervals state. If it is significantly above 1, the intervals are too small or the machine changes. "
+        "Rig to rig: do the rigs differ by more than their runs do? Trend: does the parameter change with time within each rig?"
     )
     blocks: list[Block] = [Paragraph(lead)]
     for subject, own in _by_subject(found).items():
@@ -258,7 +258,7 @@ def _answers(answered: Sequence[tuple[Task, Answered]], link: Link) -> Section:
     folds = []
     for group in groups:
         own = [(task, one) for task, one in answered if task.group == group]
-        title = f"{group or NO_GROUP}: {len(own)} answers"
+        title = f"{group or NO_GROUP}: {len(own)} answer{'s' * (len(own) != 1)}"
         folds.append(Fold(title, (_answers_table(own, link),), len(answered) <= MOST_OPEN))
     return Section("All answers", tuple(folds))
 

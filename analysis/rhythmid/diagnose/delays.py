@@ -49,9 +49,14 @@ def delays_of(fit: Fit) -> dict[str, Any]:
         separable = False
     found["separable"] = separable
     forced = any(one.forcing is not None for one in fit.run.series)
-    found["assumption"] = (
-        "the recorded forcing acts on the machine at its stamps, without the command's delay"
-        if forced
-        else "no forcing is recorded: only the sum of the delays shows, and it is written to the one delay that is free"
-    )
+    if not forced:
+        found["assumption"] = (
+            "no forcing is recorded: only the sum of the delays shows, and it is written to the one delay that is free"
+        )
+    elif found["input"] and found["measurement"]:
+        found["assumption"] = (
+            "the recorded forcing acts on the machine at its stamps, without the command's delay"
+        )
+    else:
+        found["assumption"] = "the model has one delay, which stands for both"
     return found

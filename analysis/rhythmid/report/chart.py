@@ -35,8 +35,8 @@ class Curve:
 class Chart:
     """Curves over one pair of axes.
 
-    `x_range` is the range of the data unless given. `shaded` are stretches (from, to) of x, `levels` horizontal lines (y, label),
-    `uprights` vertical ones (x, label), `alt` the content of the chart in words for readers who cannot see it. Charts with the same `link`
+    `x_range` is the range of the data unless given. `shaded` are stretches (from, to) of x, `levels` horizontal lines (y),
+    `uprights` vertical ones (x), `alt` the content of the chart in words for readers who cannot see it. Charts with the same `link`
     show the same range of x. A `path` is a curve whose x need not grow, such as an orbit.
     """
 
@@ -47,10 +47,10 @@ class Chart:
     y_log: bool = False
     x_log: bool = False
     shaded: tuple[tuple[float, float], ...] = ()
-    levels: tuple[tuple[float, str], ...] = ()
+    levels: tuple[float, ...] = ()
     from_zero: bool = False
     x_range: tuple[float, float] | None = None
-    uprights: tuple[tuple[float, str], ...] = ()
+    uprights: tuple[float, ...] = ()
     link: str = ""
     path: bool = False
 
@@ -65,13 +65,14 @@ class Chart:
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: data range, pixels of its ends, ticks."""
+    """One axis: data range, pixels of its ends, ticks; with `whole` only whole numbers are marked."""
 
     low: float
     high: float
     begin: float
     end: float
     log: bool = False
+    whole: bool = False
 
     def __call__(self, value: Array | float) -> Array:
         given = np.asarray(value, dtype=float)
@@ -93,7 +94,8 @@ class Axis:
                 if len(found) <= most + 1:
                     return found
             return found[:: math.ceil(len(found) / most)]
-        return linear_ticks(self.low, self.high, most)
+        found = linear_ticks(self.low, self.high, most)
+        return [tick for tick in found if tick == round(tick)] if self.whole else found
 
 
 def linear_ticks(low: float, high: float, most: int = 6) -> list[float]:
@@ -137,7 +139,7 @@ def x_extent(chart: Chart) -> tuple[float, float]:
     shown = [c for c in chart.curves if len(c.x)]
     if chart.x_range is not None:
         return chart.x_range
-    given = [*(c.x for c in shown), *(np.array([x]) for x, _ in chart.uprights)]
+    given = [*(c.x for c in shown), *([np.array(chart.uprights)] if chart.uprights else [])]
     if chart.x_log or chart.path or not shown:
         return extent(given, chart.x_log)
     low, high = float(min(map(np.min, given))), float(max(map(np.max, given)))  # fill the width
@@ -148,7 +150,7 @@ def x_extent(chart: Chart) -> tuple[float, float]:
 def y_extent(chart: Chart) -> tuple[float, float]:
     """Range of y that shows the whole chart."""
     heights = [part for c in chart.curves for part in (c.y, c.low, c.high) if part is not None]
-    return extent([*heights, *(np.array([level]) for level, _ in chart.levels)], chart.y_log, chart.from_zero)
+    return extent([*heights, np.array(chart.levels)], chart.y_log, chart.from_zero)
 
 
 def draw(chart: Chart) -> str:
@@ -167,20 +169,12 @@ def draw(chart: Chart) -> str:
         )
     for curve in shown:
         parts.append(_path(curve, x, y) if chart.path else _curve(curve, x, y))
-    for place, label in chart.uprights:
+    for place in chart.uprights:
         at = float(x(place))
         parts.append(f'<line class="level" x1="{at:.1f}" x2="{at:.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>')
-        end = at > WIDTH / 2
-        parts.append(
-            f'<text class="note" x="{at + (-4 if end else 4):.1f}" y="{TOP + 11}" text-anchor="{"end" if end else "start"}">'
-            f"{escape(label)}</text>"
-        )
-    for level, label in chart.levels:
+    for level in chart.levels:
         at = float(y(level))
         parts.append(f'<line class="level" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{at:.1f}" y2="{at:.1f}"/>')
-        parts.append(
-            f'<text class="note" x="{WIDTH - RIGHT - 3}" y="{at - 4:.1f}" text-anchor="end">{escape(label)}</text>'
-        )
     return "".join([*parts, "</svg>"])
 
 

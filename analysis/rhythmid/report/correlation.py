@@ -33,7 +33,7 @@ def correlation_figure(found: Correlation) -> Drawing:
     return Drawing(
         "Correlation of the parameters",
         _draw(found),
-        f"How the errors of two estimates go together: 1 and −1 mean that the records tell only one combination of the two. "
+        f"How the errors of two estimates go together: 1 and −1 mean that the records determine only one combination of the two. "
         f"Columns are numbered like rows. {_strongest(found)}",
     )
 

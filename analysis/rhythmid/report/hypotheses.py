@@ -11,6 +11,7 @@ from rhythmid.report.quantity import NONE, number, percent, plain, plus_minus, p
 from rhythmid.report.row_chart import Bar, draw_bars
 
 HYPOTHESES_SHOWN, REJECTIONS_SHOWN, SCORES_SHOWN = 12, 12, 12
+AS_GOOD, REJECTED = "as good as the chosen one", "rejected, see below"  # verdicts on a hypothesis
 LEAST_ODDS = math.log(40.0)  # difference of log density above which a simpler model is rejected
 KINDS = {
     "nominal": "nothing is missing",
@@ -54,7 +55,7 @@ def hypotheses_section(found: Findings) -> Section:
         "stretches of the records. The weights divide the evidence among hypotheses with no more effects than the chosen one; the probability of a "
         "name adds those of all hypotheses that hold it, or a richer law that contains it."
     )
-    blocks.append(_evidence(found, rows[:HYPOTHESES_SHOWN], chosen, weighed))
+    blocks.append(_evidence(found, rows[:HYPOTHESES_SHOWN], chosen, weighed, against))
     first = tuple(index for index in marked if index < HYPOTHESES_SHOWN)
     blocks.append(Table(caption, columns, tuple(table[:HYPOTHESES_SHOWN]), first))
     if len(table) > HYPOTHESES_SHOWN:
@@ -71,27 +72,34 @@ def hypotheses_section(found: Findings) -> Section:
 
 
 def _evidence(
-    found: Findings, rows: Sequence[Mapping[str, Any]], chosen: Sequence[str], weighed: int
+    found: Findings,
+    rows: Sequence[Mapping[str, Any]],
+    chosen: Sequence[str],
+    weighed: int,
+    against: set[tuple[str, ...]],
 ) -> Drawing:
     """The hypotheses as a chart; the reasons why some are rejected show under the pointer, and in the table below."""
     reasons = {tuple(sorted(row["hypothesis"])): str(row["reason"]) for row in found.result["rejections"]}
     made = []
     for row in rows:
         elements = tuple(row["elements"])
-        reason, taken = reasons.get(tuple(sorted(elements))), sorted(elements) == chosen
-        weight = "rejected" if reason and not taken else _weight(row, weighed)
+        key, taken = tuple(sorted(elements)), sorted(elements) == chosen
+        alike = interchangeable(elements, chosen, found.result["indistinguishable"])
+        reason = reasons.get(key) if key in against and not taken else None
+        weight = "rejected" if reason else _weight(row, weighed)
         behind = plus_minus(row["score_difference"], row["standard_error"] or 0.0)
         made.append(
             Evidence(
                 _named(found, elements), float(row["score_difference"]), float(row["standard_error"] or 0.0), weight,
-                "after" if taken else "before" if reason else "measured", taken,
-                f"{_named(found, elements)}: predicts worse by {behind}" + (f"; not believed: {plain(reason)}" if reason else ""),
+                "after" if taken else "third" if alike else "before" if reason else "measured", taken,
+                f"{_named(found, elements)}: predicts worse by {behind}" + (f"; rejected: {plain(reason)}" if reason else ""),
             )
         )  # fmt: skip
     words = "; ".join(f"{one.label} {number(one.worse, 3)}, {one.text}" for one in made)
     legend = [
         ("circle after", "chosen"),
-        ("circle before", "not believed, see below"),
+        ("circle third", AS_GOOD),
+        ("circle before", REJECTED),
         ("circle measured", "less likely"),
     ]
     return Drawing(
@@ -153,11 +161,11 @@ def _row(
     behind = "best"
     if row["score_difference"]:
         behind = plus_minus(row["score_difference"], row["standard_error"] or 0.0)
-    said = "not believed, see below" if tuple(sorted(elements)) in against else NONE
+    said = REJECTED if tuple(sorted(elements)) in against else NONE
     if sorted(elements) == chosen:
         said = "chosen"
     elif interchangeable(elements, chosen, found.result["indistinguishable"]):
-        said = "as good as the chosen one"
+        said = AS_GOOD
     chance = _weight(row, weighed)
     kind = KINDS.get(row["kind"], pretty_name(row["kind"]))
     return name, kind, behind, chance, percent(row["heldout_nrmse"]), said
@@ -202,10 +210,10 @@ def _scores(found: Findings) -> list[Block]:
 def rejections_section(found: Findings) -> Section:
     """Reasons against hypotheses, one row for each rule that rejects one."""
     rejections: Sequence[Mapping[str, Any]] = found.result["rejections"]
-    title = "What is not believed, and why"
+    title = "Rejected hypotheses, and why"
     if not rejections:
-        return Section(title, (Paragraph("No rule speaks against any of the hypotheses."),))
-    columns = ("hypothesis", "rule", "statistic", "least", "reason")
+        return Section(title, (Paragraph("No rule rejects any of the hypotheses."),))
+    columns = ("hypothesis", "rule", "statistic", "threshold", "reason")
     rows = tuple(
         (
             _named(found, row["hypothesis"]),
@@ -216,7 +224,7 @@ def rejections_section(found: Findings) -> Section:
         )
         for row in rejections
     )
-    caption = "A rule rejects a hypothesis whose statistic is below the least that it asks for."
+    caption = "A rule rejects a hypothesis whose statistic is below its threshold."
     blocks: list[Block] = [Table(caption, columns, rows[:REJECTIONS_SHOWN])]
     if len(rows) > REJECTIONS_SHOWN:
         every = Table(f"{caption} All rejections.", columns, rows)

@@ -8,7 +8,16 @@ import numpy as np
 from rhythmid.report.blocks import Block, Bullets, Fold, Paragraph, Section, Table, Tile, Tiles
 from rhythmid.report.correlation import Correlation, correlation_figure
 from rhythmid.report.page import Page
-from rhythmid.report.quantity import NONE, number, percent, plain, pretty_name, sentence, with_unit
+from rhythmid.report.quantity import (
+    NONE,
+    number,
+    percent,
+    plain,
+    pretty_name,
+    probability,
+    sentence,
+    with_unit,
+)
 from rhythmid.report.record_quality import RecordQuality, quality_section
 from rhythmid.report.residual_figures import error_table, residual_folds
 from rhythmid.report.run import Compared, Run
@@ -203,7 +212,8 @@ def transfer_section(functions: Sequence[TransferFunction], unit: str = "m/N", *
 def _missing(result: Mapping[str, Any]) -> tuple[Block, ...]:
     """Conditions of transfer functions, or of the paper's method, that fail here."""
     about, methods = result.get("transfer_functions") or {}, result.get("methods") or {}
-    lacks = dict.fromkeys((about.get("missing"), methods.get("paper_missing")))
+    missing, paper = about.get("missing"), methods.get("paper_missing")
+    lacks = [missing, f"the paper's method is not used: {paper}" if paper and paper != missing else None]
     return tuple(Paragraph(sentence(text), "note") for text in lacks if text)
 
 
@@ -223,7 +233,7 @@ def _errors(result: Mapping[str, Any], unit: str) -> tuple[Block, ...]:
         rows.append(
             (
                 harmonic_name(one["m"]), _size(one["magnitude"], max, unit),
-                *(_size(one[key], _rms, unit) for key in LEVELS), NONE if p_value is None else f"{p_value:.1g}",
+                *(_size(one[key], _rms, unit) for key in LEVELS), probability(p_value),
             )
         )  # fmt: skip
     words = method

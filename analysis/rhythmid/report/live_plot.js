@@ -124,33 +124,17 @@ function rule(plot, chart) {
   ctx.beginPath();
   ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
   ctx.clip();
-  ctx.strokeStyle = ctx.fillStyle = colour("ink");
+  ctx.strokeStyle = colour("ink");
   ctx.lineWidth = devicePixelRatio;
   ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
-  ctx.font = FONT.replace("12px", `${12 * devicePixelRatio}px`);
-  const gap = 4 * devicePixelRatio;
-  const write = (text, x, y) => { // with a margin, so that it can be read over curves
-    ctx.save();
-    ctx.setLineDash([]);
-    ctx.strokeStyle = colour("paper");
-    ctx.lineWidth = 3 * devicePixelRatio;
-    ctx.lineJoin = "round";
-    ctx.strokeText(text, x, y);
-    ctx.restore();
-    ctx.fillText(text, x, y);
-  };
   const line = (x0, y0, x1, y1) => { ctx.beginPath(); ctx.moveTo(x0, y0); ctx.lineTo(x1, y1); ctx.stroke(); };
-  for (const [value, label] of chart.levels) {
+  for (const value of chart.levels) {
     const y = plot.valToPos(value, "y", true);
     line(bbox.left, y, bbox.left + bbox.width, y);
-    ctx.textAlign = "right";
-    write(label, bbox.left + bbox.width - gap, y - gap);
   }
-  for (const [value, label] of chart.uprights) {
-    const x = plot.valToPos(value, "x", true), far = x > bbox.left + bbox.width / 2;
+  for (const value of chart.uprights) {
+    const x = plot.valToPos(value, "x", true);
     line(x, bbox.top, x, bbox.top + bbox.height);
-    ctx.textAlign = far ? "right" : "left";
-    write(label, x + (far ? -gap : gap), bbox.top + 3 * gap);
   }
   ctx.restore();
 }
@@ -294,7 +278,7 @@ function optionsOf(chart, width) {
     width, height: HEIGHT, mode: chart.path ? 2 : 1, legend: { show: false },
     scales: {
       x: scale(chart.x, ends(chart.x)),
-      y: scale(chart.y, chart.path ? ends(chart.y) : rangeOf(chart.y, chart.levels.map(([value]) => value))),
+      y: scale(chart.y, chart.path ? ends(chart.y) : rangeOf(chart.y, chart.levels)),
     },
     axes: [axis(chart.x, "x", 2), axis(chart.y, "y", 3)],
     series: seriesOf(chart), bands: chart.path ? [] : bandsOf(chart),

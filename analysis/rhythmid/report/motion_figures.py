@@ -14,7 +14,6 @@ from rhythmid.report.run import Compared, Run, density
 Array = NDArray[np.float64]
 CYCLES = 6.0  # of the strongest line, that a phase portrait shows
 SMOOTHED = 0.1  # of a cycle, over which a cubic is fitted for the velocity
-SWITCHING = "switching"  # label of the places at which the model switches
 FEWEST_IN_WINDOW = 7  # samples that such a cubic is fitted to at least
 
 
@@ -89,8 +88,8 @@ def portrait(run: Run, compared: Compared) -> Drawing | None:
         Chart(
             f"{run.name}: velocity over position, as measured and as {compared.made}.",
             f"position [{pretty_unit(unit)}]", f"velocity [{pretty_unit(f'{unit}/s')}]", tuple(curves), path=True,
-            uprights=tuple((factor * value, SWITCHING) for value in sorted({one.value for one in places})),
-            levels=tuple((factor * value, SWITCHING) for value in sorted({one.value for one in speeds})),
+            uprights=tuple(factor * value for value in sorted({one.value for one in places})),
+            levels=tuple(factor * value for value in sorted({one.value for one in speeds})),
         ),
-        f"Velocity over position in the last {CYCLES:.0f} cycles, both by a cubic over {100 * SMOOTHED:.0f} % of a cycle.{switching}",
+        f"Velocity over position in the last {CYCLES:.0f} cycles, both smoothed by a cubic polynomial over {100 * SMOOTHED:.0f} % of a cycle.{switching}",
     )  # fmt: skip

@@ -37,9 +37,10 @@ def draw_runs(alt: str, x_label: str, y_label: str, points: Sequence[Point], mea
     ends = [np.array([point.y - point.half, point.y + point.half]) for point in points]
     low, high = extent([*ends, np.array([mean])])
     shift = mean if high - low < NARROW_SPREAD * abs(mean) else 0.0
-    x = Axis(*_with_air([point.x for point in points]), LEFT, WIDTH - RIGHT)
+    numbered = all(point.x == round(point.x) for point in points)  # runs, not times
+    x = Axis(*_with_air([point.x for point in points]), LEFT, WIDTH - RIGHT, whole=numbered)
     y = Axis(low - shift, high - shift, HEIGHT - BOTTOM, TOP)
-    said = f"{y_label}, less {number(shift, 7)}" if shift else y_label
+    said = f"{y_label} above {number(shift, 7)}" if shift else y_label
     parts = [opening(WIDTH, HEIGHT, alt), *frame(x, y, x_label, said)]
     middle = float(y(mean - shift))
     parts.append(

@@ -107,23 +107,23 @@ def delays_section(delays: Mapping[str, Any], before: Mapping[str, Any] | None =
     blocks: list[Block] = [Table("Delays with 95 % intervals.", columns, tuple(rows))]
     assumption = str(delays.get("assumption") or "")
     if delays.get("separable"):
-        said = "These records can tell the two delays apart"
+        said = "These records separate the two delays"
         blocks.append(Paragraph(f"{said}, provided that {_lower(assumption)}." if assumption else f"{said}."))
     else:
-        said = "These records cannot tell the two delays apart; trust their sum only"
+        said = "Use only the sum of the two delays"
         blocks.append(Paragraph(f"{said}: {_lower(assumption)}." if assumption else f"{said}."))
     closure = (delays.get("closure") or {}).get("z")
     if closure is not None:
         blocks.append(
             Paragraph(
-                f"Check: the phase of the limit cycle plus the offset of the sidebands is the sum of the delays seen another way than by "
-                f"the slope of G₀. The two differ by {number(abs(closure), 2)} standard deviations; more than 3 would be suspicious."
+                "Check (closure): the phase of the limit cycle plus the offset of the sidebands gives the sum of the delays, and so does the slope of G₀. "
+                f"The two differ by {number(abs(closure), 2)} standard deviations; more than 3 would mean that the model is wrong."
             )
         )
     if before is not None:
         blocks.append(
             Paragraph(
-                "A model that lacks an effect makes up for it with its delays too: quote those of the model with the effect.",
+                "A model that lacks an effect compensates for it with its delays, too. Use the delays of the final model.",
                 "note",
             )
         )

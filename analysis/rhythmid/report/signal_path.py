@@ -136,7 +136,7 @@ def _lying(content: Mapping[str, SlotContent], forced: bool, alt: str, note: str
     if forced:
         parts.append(_arrow(junction, 26, junction, middle - 11))
         parts.append(
-            f'<text class="signal" x="{junction:.0f}" y="18" text-anchor="middle">f0, the forcing</text>'
+            f'<text class="signal" x="{junction:.0f}" y="18" text-anchor="middle">f₀, the forcing</text>'
         )
     parts.append(
         _arrow(498, middle, 530, middle) + _arrow(724, middle, 756, middle) + _arrow(950, middle, 994, middle)
@@ -164,7 +164,7 @@ def _standing(content: Mapping[str, SlotContent], forced: bool, alt: str, note: 
             parts.append(_arrow(centre, y, centre, y + 21) + _sum(centre, y + 32))
             if forced:
                 parts.append(_arrow(x + 30, y + 32, centre - 11, y + 32))
-                parts.append(f'<text class="signal" x="{x - 50:.0f}" y="{y + 36:.0f}">f0, forcing</text>')
+                parts.append(f'<text class="signal" x="{x - 50:.0f}" y="{y + 36:.0f}">f₀, forcing</text>')
             y += 43
         parts.append(_arrow(centre, y, centre, y + 34))
         y += 46 if name != "sensor" else 36

@@ -76,7 +76,7 @@ def _shift(m: int) -> str:
     if m == 0:
         return "appears at its own frequency"
     side = "above" if m > 0 else "below"
-    return f"appears {'' if abs(m) == 1 else f'{abs(m)} × '}the pumping frequency {side} its own"
+    return f"appears {'once' if abs(m) == 1 else f'{abs(m)} times'} the pumping frequency {side} its own frequency"
 
 
 def _phase(one: TransferFunction, name: str, band: Array | None, magnitude: Array) -> Drawing:

@@ -21,7 +21,7 @@ def kernel(x, v, t, f, force, asymmetry, transition, mass, step):
 ELEMENT = Element(
     name="asymmetric_coulomb_friction",
     slot="force",
-    title="Direction-dependent Coulomb friction",
+    title="Asymmetric Coulomb friction",
     equation="F = −F_c± sgn v,  F_c± = F_c (1 ± a)",
     parameters=(
         Parameter("force", "N", "mean friction force F_c of both directions", bounds=(0.0, math.inf)),

@@ -9,7 +9,7 @@ from rhythmid.commands.options import command_line
 from rhythmid.errors import InputError
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.punctuality import punctuality_notes
-from rhythmid.report.blocks import Bullets, Paragraph, Section, Table
+from rhythmid.report.blocks import Bullets, Fold, Paragraph, Section, Table
 from rhythmid.report.page import Page, write_page
 from rhythmid.report.quantity import sentence
 from rhythmid.report.recording import recording_page
@@ -29,7 +29,7 @@ def run_page(bag: Path, observed: Observed, outcome: Outcome) -> Page:
     found = quality_report(bag)
     section = _run(observed, outcome)
     good = outcome.code == 0
-    verdict = ("The run came to its end", "good") if good else ("The run broke off", "open")
+    verdict = ("The run finished", "good") if good else ("The run broke off", "open")
     return recording_page(found.to_dict(), found.record, found.remarks, command_line(), (section,), verdict)
 
 
@@ -41,15 +41,14 @@ def _run(observed: Observed, outcome: Outcome) -> Section:
         (
             Paragraph(lead, "lead"),
             *([Bullets(tuple(map(sentence, notes)))] if notes else []),
-            *([_nodes(observed.figures)] if observed.figures else []),
+            *(_node(name, told, outcome.code != 0) for name, told in sorted(observed.figures.items())),
         ),
     )
 
 
-def _nodes(figures: Mapping[str, Mapping[str, str]]) -> Table:
-    rows = tuple(
-        (node if number == 0 else "", key, value)
-        for node, told in figures.items()
-        for number, (key, value) in enumerate(told.items())
+def _node(name: str, told: Mapping[str, str], opened: bool) -> Fold:
+    """What a node reports; it matters where something went wrong."""
+    rows = tuple((key, value or "none") for key, value in told.items())
+    return Fold(
+        f"What {name} reports", (Table("At the end of the run.", ("quantity", "value"), rows),), opened
     )
-    return Table("What each node reports.", ("node", "quantity", "value"), rows)
