@@ -62,6 +62,16 @@ def test_a_machine_that_nothing_drives_is_released_from_other_amplitudes(amplitu
     assert next_experiment(found, [other.best], series, False) == NONE_NEEDED_FREE
 
 
+def test_no_experiment_is_proposed_that_would_not_show_the_difference():
+    series = decay(0.5)
+    nominal = Model.from_text(PENDULUM)
+    found = search_of(estimate(nominal, series))
+    rival = nominal.with_element(CATALOGUE["coulomb_friction"], {"force": 1e-6, "transition": 1e-3})
+    other = search_of(estimate(rival, series, names=nominal.free), "coulomb_friction")
+    said = next_experiment(found, [other.best], series, True)
+    assert said.startswith("none of the experiments that were compared would separate the nominal model from")
+
+
 def test_a_rival_is_what_the_records_do_not_tell_from_the_best():
     series = decay(0.5)
     nominal = Model.from_text(PENDULUM)

@@ -135,14 +135,14 @@ def rounded(value: float, std: float | None) -> str:
     places = min(decimals(std), DECIMALS)
     exponent = math.floor(math.log10(max(abs(value), std)))
     if exponent >= 6 or exponent < -4:
-        return f"{value:.{max(exponent + places, 0)}e}"
+        return f"{value:.{max(exponent + places, 0)}e}" if value else "0"
     value = round(value, places)
     return f"{value if value else 0.0:.{max(places, 0)}f}"  # no minus zero
 
 
 def with_std(value: float, std: float | None) -> str:
     """A value ± its standard deviation, plain text for a terminal; without one the value alone."""
-    return rounded(value, std) + ("" if std is None else f" ± {std:.2g}")
+    return rounded(value, std) + ("" if std is None else f" ± {rounded(std, std)}")
 
 
 def written_percent(share: float | None) -> str:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.diagnose.constants import FALSE_ALARM
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.search.refit import fine_enough
 from rhythmid.diagnose.search.trial import Trial
@@ -37,6 +38,9 @@ NONE_NEEDED_FREE = (
 MORE_FREE = "repeat the records with releases from larger and smaller amplitudes"
 # of the largest amplitude in the records: laws of position and of speed differ most far from the recorded amplitudes
 RELEASES = (0.3, 3.0)
+# chi-squared that an experiment has to be expected to show: half of it is the gain in log density, which has to reach the odds at which
+# one hypothesis replaces a simpler one
+SEPARATES = -2.0 * math.log(FALSE_ALARM)
 
 
 @dataclass(frozen=True)
@@ -200,6 +204,11 @@ def next_experiment(found: Search, rivals: Sequence[Trial], series: Sequence[Ser
     top = menu[0]
     versus = " + ".join(others[0].added) or "the nominal model"
     mine = " + ".join(best.added) or "the nominal model"
+    if top.chi2 < SEPARATES:
+        return (
+            f"none of the experiments that were compared would separate {mine} from {versus}: their outputs would differ by "
+            f"{top.apart:.2g} standard deviations of the noise (rms) at most"
+        )
     return (
         f"{top.words}: expected to separate {mine} from {versus}, whose outputs would then differ by "
         f"{top.apart:.2g} standard deviations of the noise (rms)"
