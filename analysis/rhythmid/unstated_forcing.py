@@ -37,6 +37,6 @@ def resolved_forcing(given: Forcing | None, model: Model) -> tuple[Forcing, bool
 def assumed_note(forcing: Forcing) -> str:
     """One line for the user: an assumed forcing acts, and how to state another or none."""
     return (
-        f"no forcing is stated: {forcing.amplitude:g} N at {forcing.frequency:g} Hz acts; write  forcing: {{amplitude: 0}}  in the "
-        "experiment where none acts, or the forcing that does"
+        f"no forcing is stated, so one of {forcing.amplitude:g} N at {forcing.frequency:g} Hz acts; state it in the experiment, or write  "
+        "forcing: {amplitude: 0}  if none acts"
     )

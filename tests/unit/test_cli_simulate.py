@@ -50,7 +50,7 @@ def test_a_bag_is_written_that_holds_the_offline_run(folder, rhythmid):
     assert (done.returncode, done.stderr) == (0, "")
     first, note = done.stdout.splitlines()
     assert first == "bag: 500 samples at 1000 Hz of excitation, joint_states, forcing"
-    assert note.startswith("note: no forcing is stated: 1 N at 1 Hz acts; ")
+    assert note.startswith("note: no forcing is stated, so one of 1 N at 1 Hz acts; ")
     expected = perform(Experiment.load(folder / "run.yaml"))
     found = recorded(folder / "bag")
     assert sorted(found) == ["/hopper/excitation", "/hopper/forcing", "/hopper/joint_states"]

@@ -42,9 +42,9 @@ def test_clocks_that_run_apart_are_told_with_the_uncertainty(clock):
         for one in clock_notes(
             {"input": channel(0.0, 1), "output": channel(5e-5, 2)}, {"input": clock, "output": "header"}
         )
-        if "run" in one
+        if "drifts" in one
     ]
-    assert note.startswith("the times of the output run +") and "µs/s against those of the input" in note
+    assert note.startswith("the clock of the output drifts by +") and "µs/s against that of the input" in note
     assert "use  time: receive  for both" in note
 
 

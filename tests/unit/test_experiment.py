@@ -303,7 +303,9 @@ def test_units_that_are_stated_to_be_newtons_and_metres_change_nothing(folder):
 def test_an_assumed_forcing_is_told_in_one_line_and_a_stated_one_is_not(folder):
     experiment = load(folder, SHORT)
     (note,) = experiment.notes
-    assert note.startswith("no forcing is stated: 1 N at 1 Hz acts; write  forcing: {amplitude: 0}")
+    assert note.startswith(
+        "no forcing is stated, so one of 1 N at 1 Hz acts; state it in the experiment, or write  forcing: {amplitude: 0}"
+    )
     stated = load(folder, SHORT + "forcing: {amplitude: 0}\n")
     assert not stated.notes and not stated.description()["forcing_assumed"]
 

@@ -28,5 +28,5 @@ def test_what_a_fit_alone_tells_of_a_size_is_told(verdict: str, own: float, std:
     notes = own_sizes(cast(Decision, decision), cast(Fit, fit), {"coulomb_friction": own})
     assert len(notes) == told
     assert all(
-        one.startswith("coulomb_friction.force: 0.500 ± 0.02 N beside the other effects") for one in notes
+        one.startswith("coulomb_friction.force: 0.500 ± 0.020 N beside the other effects") for one in notes
     )

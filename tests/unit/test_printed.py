@@ -80,11 +80,11 @@ def printed(answer: Diagnosis = ANSWER) -> str:
     [
         "missing physics: The model lacks coulomb friction.",
         "probability 97 %, 92 % of the mismatch",
-        "left: 3 % of the mismatch, which depends on velocity",
+        "remainder: 3 % of the mismatch, which depends on velocity",
         "scored: by the recorded effort below 12 Hz: a controller holds the machine",
         "assumption: The recorded effort is taken to be true in scale.",
         "not tried: sensor_lag, sensor_drift: not seen",
-        "not believed: second mode (only a limit of its parameters is identifiable, where it is another effect)",
+        "rejected: second mode (only a limit of its parameters is identifiable, where it is another effect)",
         "refitted nominal: NRMSE 0.05000 on fitted data, 0.06000 held out",
         "augmented: NRMSE 0.01000 on fitted data, — held out",
         "next experiment: a slow reversal [of the speed]",
@@ -98,7 +98,7 @@ def test_hypotheses_stand_in_a_table_with_differences_and_weights_of_evidence():
     rows = [line for line in printed().splitlines() if line.startswith("│")][1:]
     best, chosen, nominal = rows
     assert "coulomb_friction + position_ripple" in best and "best" in best
-    assert "coulomb_friction (chosen)" in chosen and "2 ± 0.6" in chosen and "0.97" in chosen
+    assert "coulomb_friction (chosen)" in chosen and "2.00 ± 0.60" in chosen and "0.97" in chosen
     assert "nominal model" in nominal and "500 ± 150" in nominal and "0.00" in nominal
 
 
@@ -144,10 +144,10 @@ def test_what_is_not_believed_comes_in_the_order_of_the_hypotheses_and_is_no_riv
     )
     alike = (("coulomb_friction", "stribeck_friction"),)
     text = printed(replace(ANSWER, rejections=rows, indistinguishable=alike))
-    said = [line for line in text.splitlines() if line.startswith("not believed")]
+    said = [line for line in text.splitlines() if line.startswith("rejected")]
     assert said == [
-        "not believed: coulomb friction + position ripple (too small a part)",
-        "not believed: position ripple (too small a part)",
+        "rejected: coulomb friction + position ripple (too small a part)",
+        "rejected: position ripple (too small a part)",
     ]
 
 

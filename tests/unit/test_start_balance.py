@@ -184,7 +184,7 @@ def test_an_angle_in_degrees_without_a_unit_is_told_where_gravity_shows_it(tmp_p
 
 def test_gravity_of_an_angle_without_a_unit_is_told_on_the_screen(tmp_path):
     found = pendulum(tmp_path, "angle")
-    assert any("no unit of the angle is told, and gravity's law" in line for line in found.lines())
+    assert any("the unit of the angle is not stated, and gravity needs rad" in line for line in found.lines())
 
 
 @pytest.mark.parametrize(("heading", "scale"), [("angle [rad]", 1.0), ("angle [deg]", 180.0 / np.pi)])

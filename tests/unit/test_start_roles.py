@@ -361,8 +361,8 @@ def test_an_inertia_that_the_record_does_not_tell_is_what_follows_within_a_sampl
     assert model.value("inertia.mass") / model.value("viscous_damper.damping") == pytest.approx(
         step, rel=0.05
     )
-    assert "CHECK inertia.mass: the records do not tell the inertia" in "\n".join(begun.lines())
-    assert "#   CHECK: the records do not tell the inertia" in begun.model
+    assert "CHECK inertia.mass: the records do not determine the inertia" in "\n".join(begun.lines())
+    assert "#   CHECK: the records do not determine the inertia" in begun.model
 
 
 def test_the_interval_within_which_an_inertia_is_not_told_is_that_of_the_filtered_motion(tmp_path):

@@ -55,7 +55,7 @@ def test_a_stated_unit_is_that_of_the_record(table):
     record = read_record(table, Signals.from_text(found.signals))
     np.testing.assert_allclose(record.output.value, np.radians(LARGE), rtol=1e-6)
     assert (record.output.unit, record.input.unit) == ("rad", "N*m")
-    assert "no unit is told" not in found.signals
+    assert "no unit is stated" not in found.signals
 
 
 def test_a_stated_output_of_a_bag_names_its_joint(tmp_path):

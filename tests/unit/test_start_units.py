@@ -15,7 +15,7 @@ X, V = moved(FORCE, 0.05, 0.1, 6.0)
 def checked(text: str) -> list[str]:
     """The roles above which a comment on an untold unit stands."""
     lines = text.splitlines()
-    doubts = [place for place, line in enumerate(lines) if "CHECK: no unit is told" in line]
+    doubts = [place for place, line in enumerate(lines) if "CHECK: no unit is stated" in line]
     return [next(line for line in lines[place:] if line[0] != "#").split(":")[0] for place in doubts]
 
 
@@ -55,7 +55,7 @@ def test_messages_with_units_of_their_own_are_not_marked(tmp_path):
 @pytest.mark.parametrize(("scale", "marked"), [(1.0, False), (1e3, True)])
 def test_a_unit_of_time_that_only_the_steps_tell_is_marked(tmp_path, scale, marked):
     np.savez(tmp_path / "run.npz", t=scale * TIME, x=X, f=FORCE)
-    assert ("no heading tells the unit of the times" in guess(tmp_path / "run.npz").signals) == marked
+    assert ("no heading gives the unit of the times" in guess(tmp_path / "run.npz").signals) == marked
 
 
 def test_volts_of_a_position_sensor_are_no_effort_and_its_scale_is_asked_for(tmp_path):

@@ -24,6 +24,7 @@ from rhythmid.commands.begin import BEGIN
 from rhythmid.commands.terminal import console
 from rhythmid.output import STANDARD_OUTPUT, require_new, write_json
 from rhythmid.record.record import Channel
+from rhythmid.report.quantity import with_std
 from rhythmid.report.terminal_table import estimate_cells, print_estimates, print_markdown, print_table
 
 COMMANDS = (*typer.main.get_command(app).commands, "run")  # `run` is in a package of its own
@@ -266,6 +267,8 @@ def test_digits_follow_the_standard_deviation():
     assert estimate_cells(1234.5, 210.0) == ("1230", "210")
     assert estimate_cells(0.1234567, None) == ("0.1235", "—")
     assert estimate_cells(None, None) == ("not identifiable", "—")
+    assert estimate_cells(0.0, 4.3e-05) == ("0", "4.3e-05")
+    assert with_std(1.76, 0.001) == "1.7600 ± 0.0010"
 
 
 @pytest.mark.parametrize("width", [40, 100])

@@ -26,7 +26,7 @@ def test_what_nearly_all_of_the_evidence_has_is_told_beside_a_freed_value_that_i
         decision, [], FitQuality(0.1, 0.1), FitQuality(0.1, 0.1), "effort", "the mass of toe is held at 1 kg"
     )
     assert said.startswith(
-        "Whatever is beside it, nearly all of the evidence has second mode. The mass of toe"
+        "Nearly all of the evidence contains second mode, whatever else is missing. The mass of toe"
     )
 
 

@@ -67,10 +67,10 @@ def freed(*elements: str) -> Hypothesis:
 @pytest.mark.parametrize(
     ("elements", "said"),
     [
-        (("inertia.mass",), "comes out at 0.3, and that predicts"),
-        (("coulomb_friction", "inertia.mass"), "and that with Coulomb friction predicts"),
-        (("inertia.mass", "coulomb_friction"), "and that with Coulomb friction predicts"),
-        (("inertia.mass", "linear_spring.stiffness"), "0.3. linear_spring.stiffness is held at 200 N/m"),
+        (("inertia.mass",), "is estimated at 0.3, and this predicts"),
+        (("coulomb_friction", "inertia.mass"), "and this with Coulomb friction predicts"),
+        (("inertia.mass", "coulomb_friction"), "and this with Coulomb friction predicts"),
+        (("inertia.mass", "linear_spring.stiffness"), "0.3. linear_spring.stiffness is fixed at 200 N/m"),
     ],
 )
 def test_a_freed_value_is_told_wherever_it_stands_among_the_effects(elements, said):
@@ -88,7 +88,7 @@ def test_a_second_effect_whose_family_alone_is_certain_is_told_beside_the_first(
     assert said.endswith(" The model lacks some form of stiffness (90 %), too; the law is undecided.")
 
 
-@pytest.mark.parametrize(("unit", "told"), [("1", "held at 2."), ("kg", "held at 2 kg.")])
+@pytest.mark.parametrize(("unit", "told"), [("1", "fixed at 2."), ("kg", "fixed at 2 kg.")])
 def test_a_pure_number_is_told_without_a_unit(unit, told):
     model = Model.from_text(
         f"units: {{mass: '{unit}', force: '{unit}*m/s^2'}}\n"
@@ -111,6 +111,6 @@ def test_a_delay_that_alone_explains_the_records_is_given_in_the_summary():
     told = summary_of(decision, [], FitQuality(0.1, 0.1), FitQuality(0.01, 0.01), "motion", said)
     assert (
         told
-        == "The input is delayed by 12.2700 ± 0.009 ms, longer than was given, and that explains the records."
+        == "The input is delayed by 12.2700 ± 0.0090 ms, longer than was given, and that explains the records."
     )
     assert longer_delay(0.01227, 9e-6, decided(contest(NOMINAL, friction()))[1]) is None

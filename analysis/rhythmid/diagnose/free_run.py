@@ -53,7 +53,7 @@ from rhythmid.identify.student import autocorrelation_time
 OTHER_KINDS = "freed values, longer delays, other places, free functions and related laws"
 INTERVALS = "intervals followed along the likelihood, and integration in finer steps"
 BEFORE = "what the mismatch of the nominal model depends on"
-AGAIN = "what the model that was chosen in the end leaves, which is told of the one before it"
+AGAIN = "what the finally chosen model leaves; what is given is left by the model before it"
 SMALL_EFFECTS = "what small effects that no hypothesis names add to the standard deviations"
 RERUN = "free runs over the held-out records for the report"
 

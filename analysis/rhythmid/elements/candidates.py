@@ -15,9 +15,9 @@ IDLE = "no command, forcing or controller drives the machine"
 # window a constant force of each
 NEVER_REVERSED = "the motion never comes back, and without reversals nothing but the first way shows what it does before it slides"
 STEADY = "the drive passes through each level only once in the same direction in each record, which does not show that its effect changes with time"
-ONE_WAY = "nothing in the model restores the position, and the motion never comes back, so that a force of the position is not told from one of the speed or the time"
-UNPRESSED = "the motion never comes back, and nothing drives it on where it rests, so that a stop is not told from friction"
-DYING = "nothing drives the motion, and it meets each speed once, so that a law of the time or the past is not told from one of the speed"
+ONE_WAY = "nothing in the model restores the position, and the motion never comes back, so a force that depends on position cannot be distinguished from one that depends on speed or time"
+UNPRESSED = "the motion never comes back, and nothing drives it on where it rests, so a stop cannot be distinguished from friction"
+DYING = "nothing drives the motion, and it meets each speed once, so a law of the time or of the past cannot be distinguished from one of the speed"
 LEVEL = "the drive never changes within a record, which shows no delay, lag or memory on its way"
 
 

@@ -217,7 +217,7 @@ def _of_paths(
         return Delays(nothing, nothing, total, False, words, undetermined=directions)
     if INPUT_DELAY not in fit.model.parameters or MEASUREMENT_DELAY not in fit.model.parameters:
         here = sum_of(fit, MEASUREMENT_DELAY)
-        words = f"{source} acts on the machine undelayed; there is no command, so its delay does not show"
+        words = f"{source} acts on the machine without delay; there is no command, so its delay does not show"
         return Delays(nothing, here, nothing, False, words, undetermined=directions)
     first, second = sum_of(fit, INPUT_DELAY), sum_of(fit, MEASUREMENT_DELAY)
     seen = observables(joint)
@@ -229,7 +229,7 @@ def _of_paths(
         return Delays(nothing, nothing, total, False, words, closure, (), limits, seen, directions)
 
     if first.std is None or second.std is None:
-        return only_sum("the records do not tell the two delays apart")
+        return only_sum("the records do not separate the two delays")
     if told == "delayed":
         return only_sum(
             "the forcing comes through the same delayed channel as the command: only the sum of the delays "
@@ -250,8 +250,8 @@ def _of_paths(
             "state --forcing on_robot if the forcing is made on the robot, or --forcing delayed if it is not"
         )
     words = (
-        f"{source} acts on the machine undelayed, with its phase at its stamps (δ_f = 0)"
-        + ("" if told is None else "; so stated by " + ("the user" if forcing else "the recording"))
+        f"{source} acts on the machine without delay, at its stamps (δ_f = 0)"
+        + ("" if told is None else f", as {'the user' if forcing else 'the recording'} states")
     )  # fmt: skip
     return Delays(first, second, total, True, words, closure, aliases(joint), None, seen, directions)
 

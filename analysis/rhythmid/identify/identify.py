@@ -331,7 +331,7 @@ def _by_likelihood(
     found, zeros = with_own_zeros(found)
     if unforced and not found.search.arrived and paper[0].fit.misfit < MISFIT:
         return None
-    tell("looking for clocks that drift and commands that are held")
+    tell("testing for drifting clocks and held commands")
     joint, notes = compensated(found) if found.search.arrived else (found, ())
     notes = (*zeros, *notes)
     late = command_jitter(joint.fit) if joint.search.arrived else None

@@ -46,8 +46,8 @@ def lacks_paper_method(pumping: Pumping, result: PaperResult | str) -> str | Non
     taken = operator.noise_gain[1] / used
     if taken > FREEDOM:
         return (
-            f"too few repetitions: the estimate takes {taken:.0%} of what {window.periods} pumping periods tell, which leaves too "
-            "little to judge it by; record longer"
+            f"too few repetitions: the estimate takes {taken:.0%} of the degrees of freedom that {window.periods} pumping periods give, which "
+            "leaves too few to estimate its errors from; record longer"
         )
     return None
 

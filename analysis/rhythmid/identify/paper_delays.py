@@ -10,7 +10,7 @@ from rhythmid.identify.delay_fit import DelayEstimate
 from rhythmid.identify.identification import Delays, Estimate
 from rhythmid.identify.paper import PaperResult
 
-ON_ROBOT = "the forcing acts on the machine undelayed"
+ON_ROBOT = "the forcing acts on the machine without delay"
 ASSUMPTIONS = {
     "forcing channel": f"{ON_ROBOT}, and the recorded forcing has the phase that acts, on the clock of the measurements",
     "stated formula": f"{ON_ROBOT}, with the phase stated for it in the record's time",

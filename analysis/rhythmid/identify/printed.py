@@ -19,7 +19,7 @@ def show(result: Mapping[str, Any], console: Console) -> None:
     rows = result["parameters"] | {f"delay: {name}": delays[name] for name in ("input", "measurement", "sum")}
     title = "parameters and delays" + ("" if result["usable"] else " of a fit that is not usable")
     print_estimates(console, title, rows, "name")
-    console.print(f"assuming that {delays['assumption']}")
+    console.print(f"assumption: {delays['assumption']}")
     if delays["closure"]["z"] is not None:
         console.print(
             f"closure (phase of the cycle + offset of the sidebands − slope): {delays['closure']['z']:+.2f} standard deviations"

@@ -70,8 +70,8 @@ def _running_apart(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, 
         grown = abs(apart) * (timing.end - timing.start)
         if abs(apart) > APART_BY * std and grown > WORTH_TELLING * timing.period:
             found.append(
-                f"the times of the output run {1e6 * apart:+.3g} ± {1e6 * std:.1g} µs/s against those of the {role}, as their arrivals "
-                f"tell ({1e3 * grown:.3g} ms over the record); use  time: receive  for both"
+                f"the clock of the output drifts by {1e6 * apart:+.3g} ± {1e6 * std:.1g} µs/s against that of the {role}, judged by the times "
+                f"of receipt ({1e3 * grown:.3g} ms over the record); use  time: receive  for both"
             )
     return tuple(found)
 

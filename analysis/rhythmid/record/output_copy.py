@@ -55,7 +55,7 @@ def copy_notes(record: Record) -> list[str]:
         correlation = correlation_of_copy(*_at_once(channel, record.output))
         if correlation < 0.0:
             found.append(
-                f"{role}: {doubt_of_copy(correlation)}; it tells of that controller, not of the machine"
+                f"{role}: {doubt_of_copy(correlation)}; it describes that controller, not the machine"
             )
     return found
 

@@ -86,7 +86,7 @@ def _held(record: Record) -> str:
     size = f"{float(np.abs(channel.value).max()):.4g}{unit}"
     return (
         f"the machine stands still: its {record.output_kind} never changes, though the {role} reaches {size}: static friction, a dead band "
-        "or a stop holds it, or its sensor failed; what the motion is like is told by records in which it moves"
+        "or a stop holds it, or its sensor failed; give records in which it moves"
     )
 
 

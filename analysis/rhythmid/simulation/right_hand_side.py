@@ -173,6 +173,6 @@ def _refuse_constraints(constraints: list[Term], excited: InputKind) -> None:
         )
     if constraints and excited == "base_displacement":
         raise InputError(
-            f"element {constraints[0].label!r} depends on the acceleration relative to the base, which a base's displacement does "
-            "not tell; give its acceleration"
+            f"element {constraints[0].label!r} depends on the acceleration relative to the base, which a displacement of the base does "
+            "not give; record its acceleration"
         )

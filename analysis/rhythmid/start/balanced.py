@@ -56,11 +56,11 @@ def balance_of(
     if other.kind == "pendulum" and other.law.left <= UNEXPLAINED and other.law.earns_place(found.law):
         why = (
             f"with the output in degrees (scale: {DEGREE:.9g}) the balance of forces explains {other.explained} of the {driver}, in rad "
-            f"{found.explained}: no unit of it is told, and degrees are taken"
+            f"{found.explained}: its unit is not stated, and degrees are assumed"
         )
         return replace(other, corrections=(Correction("output", why, DEGREE), *other.corrections))
     if found.kind == "pendulum":
-        doubt = f"no unit of the angle is told, and gravity's law of it takes rad: where it is in degrees, give the output  scale: {DEGREE:.9g}"
+        doubt = f"the unit of the angle is not stated, and gravity needs rad: if it is in degrees, give the output  scale: {DEGREE:.9g}"
         return replace(found, doubts=(*found.doubts, doubt))
     return found
 

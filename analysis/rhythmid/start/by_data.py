@@ -129,7 +129,7 @@ def _driver(one: Known, output: Recorded) -> Known:
     there, back = predicts(one.one, output), predicts(output, one.one)
     share = coherent(one.one, output)
     if share < GOES_ALONG and surely_drives(one.one, output, there, back):
-        reason = f"its past tells of the output ({there:.3g} times as much as by chance; back {back:.2g})"
+        reason = f"its past predicts the output ({there:.3g} times as well as chance does; in the other direction {back:.2g} times)"
     elif share >= HARDLY:
         reason = _coherence(one, output)
     else:
@@ -150,7 +150,7 @@ def _driver(one: Known, output: Recorded) -> Known:
 
 def _coherence(one: Known, output: Recorded) -> str:
     share = coherent(one.one, output)
-    return f"it is not told to be a motion, and is coherent with the output (coherence {share:.2f})"
+    return f"nothing says that it is a motion, and it is coherent with the output (coherence {share:.2f})"
 
 
 def note_of_unknown(unknown: Sequence[Known], output: Recorded) -> str:

@@ -29,7 +29,7 @@ class Carried:
     @property
     def reason(self) -> str:
         """Reason why it is the driven motion, as a phrase."""
-        return f"{self.driver} drives it: its past tells of this one ({self.there:.3g} times as much as by chance; back {self.back:.2g})"
+        return f"{self.driver} drives it: its past predicts this one ({self.there:.3g} times as well as chance does; in the other direction {self.back:.2g} times)"
 
     @property
     def doubt(self) -> str:

@@ -126,7 +126,7 @@ def _doubt_of_delay(delay: float, few: float) -> dict[str, str]:
     if delay <= few:
         return {}
     doubt = (
-        f"nothing but the balance tells of {1e3 * delay:.3g} ms, and friction, ripple and lags look like a delay, too: put in what is known "
+        f"only the balance of forces shows these {1e3 * delay:.3g} ms, and friction, ripple and lags look like a delay, too: put in what is known "
         "of the bus or the drive, or delete it"
     )
     return {"input_delay": doubt}
@@ -145,7 +145,7 @@ def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
     least = max(found["velocity"] * period, found.get("position", 0.0) * period**2)
     if found["acceleration"] < least:
         doubts.append(
-            f"the records do not tell the inertia, which the balance puts at {found['acceleration']:.1g}: this is the largest that "
+            f"the records do not determine the inertia, which the balance estimates at {found['acceleration']:.1g}: the value written is the largest that "
             f"follows the other forces within {1e3 * period:.3g} ms, the interval at which the motion is known once noise is filtered "
             "out; put in what is known, and fix it"
         )
@@ -307,7 +307,7 @@ def _scaled(
     }
     units = [roles.choices[role].recorded.unit for role in ("input", "output") if role in roles.choices]
     if len(units) == 2 and units[0] == units[1] != "":
-        doubt = f"both are told to be in {units[0]}, so that a load, friction or a wrong scale keeps the machine from its reference"
+        doubt = f"both are stated in {units[0]}, so a load, friction or a wrong scale keeps the machine from its reference"
         return model, reasons, {"sensor_gain": doubt}
     return model, reasons, {}
 

@@ -308,7 +308,7 @@ def _signals(
         lines += [line for doubt in of_effort for line in comment(f"CHECK {doubt}.")]
     else:
         doubts.append(
-            "effort: whether it was recorded before the actuator or at the joint, and as a mean or at an instant, is not told"
+            "effort: nothing says whether it was recorded before the actuator or at the joint, and as a mean or at an instant"
         )
         doubts += of_effort
         lines += [
@@ -385,6 +385,6 @@ def _said_of_gains(gains: Mapping[str, tuple[float, float, float] | None]) -> li
     if len(told) < len(gains):
         of = f" at {', '.join(joint for joint in gains if joint not in told)}" if told else ""
         lines += comment(
-            f"  CHECK position_control: the gains of the robot's controllers are not told by what was recorded{of}. Without an effort, forces have their scale from them."
+            f"  CHECK position_control: the records do not determine the gains of the robot's controllers{of}. Without an effort, forces have their scale from them."
         )
     return lines

@@ -10,8 +10,8 @@ from rhythmid.start.relation import follows
 from rhythmid.start.unnamed_joints import column_groups
 
 HOW = (
-    "its columns have no names; without names joints are told where the columns stand in groups of one column for each joint, with the "
-    "positions and right after them their speeds; else give the table a first line of names, such as  t, q1, q2, tau1, tau2"
+    "its columns have no names; without names, joints are recognised only if the columns stand in groups of one column for each joint, the "
+    "speeds right after the positions; else give the table a first line of names, such as  t, q1, q2, tau1, tau2"
 )
 
 

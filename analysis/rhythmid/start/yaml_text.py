@@ -125,7 +125,7 @@ def _time_doubt(clock: Clock) -> list[str]:
     if clock.kind != "column" or clock.scale not in SCALES or heading.unit:
         return []
     return comment(
-        "  CHECK: no heading tells the unit of the times; the size of their steps is all that says it."
+        "  CHECK: no heading gives the unit of the times; it is inferred from the size of their steps."
     )
 
 
@@ -273,7 +273,7 @@ def _unit_doubt(one: Recorded, unit: str) -> list[str]:
     if tells_unit(one):
         return []
     return comment(
-        f"  CHECK: no unit is told; {unit} is taken. For another one:  scale: what one of its units is in {unit}."
+        f"  CHECK: no unit is stated; {unit} is assumed. For another one:  scale: the size of its unit in {unit}."
     )
 
 

@@ -107,7 +107,7 @@ class Stretch:
         doubts = [Doubt.of(self.output.time, self.late, at.start, at.stop) for at in pieces]
         if sum(doubt.punctual for doubt in doubts) < max(len(doubts) // 2, SETTLED + 1):
             raise InputError(
-                "most measurements of the healthy stretch came too late to tell of the physics; use a quieter machine"
+                "most measurements of the healthy stretch came too late to be used; use a quieter computer"
             )
         return doubts
 

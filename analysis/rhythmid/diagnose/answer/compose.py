@@ -62,7 +62,9 @@ Array = NDArray[np.float64]
 SHOWN = 8  # alternatives listed
 VARIES = 0.2  # share of the mismatch from which a free function of a quantity is told with its location
 ONE_CLOCK = "The clocks of command and measurement agree: an offset between them counts as delay."
-MORE_TIME = "none computed in the time given; a larger --budget tells which experiment separates best"
+MORE_TIME = (
+    "not computed in the time given; with a larger --budget the answer says which experiment separates best"
+)
 
 
 def explanations(contest: Contest, decision: Decision) -> tuple[Explanation, ...]:

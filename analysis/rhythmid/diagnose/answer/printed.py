@@ -9,7 +9,7 @@ from rich.markup import escape
 from rhythmid.diagnose.answer.result import Diagnosis, Explanation, Scored
 from rhythmid.diagnose.rejections import Rejection
 from rhythmid.report.hypotheses import grouped, interchangeable, most_weighed
-from rhythmid.report.quantity import NONE, RARE, averaged_words, remaining_error, written_percent
+from rhythmid.report.quantity import NONE, RARE, averaged_words, remaining_error, with_std, written_percent
 from rhythmid.report.terminal_table import print_estimates, print_table
 
 HYPOTHESES_SHOWN = 6
@@ -44,7 +44,7 @@ def show(found: Diagnosis, console: Console) -> None:
         lines.said("indistinguishable here", ", ".join(group))
     if len(found.hypotheses) > 1:
         _print_hypotheses(found, console)
-    lines.said("left", remainder_words(found))
+    lines.said("remainder", remainder_words(found))
     lines.said("scored", scoring_words(found.scoring))
     for name, fit in found.fit.items():
         if name == "augmented" and fit == found.refitted_nominal:
@@ -61,7 +61,7 @@ def show(found: Diagnosis, console: Console) -> None:
         for line in group:
             lines.said(label, line)
     for line in rejection_words(told_rejections(found)):
-        lines.said("not believed", line)
+        lines.said("rejected", line)
     lines.said("next experiment", found.next_experiment)
 
 
@@ -161,9 +161,7 @@ def rejection_words(rejections: Sequence[Rejection]) -> list[str]:
 
 def _worse(difference: float, error: float) -> str:
     """A difference of log densities with its standard error, in whole numbers where it is large."""
-    if difference >= 10.0:
-        return f"{difference:.0f} ± {error:.0f}"
-    return f"{difference:.2g} ± {error:.2g}"
+    return f"{difference:.0f} ± {error:.0f}" if difference >= 10.0 else with_std(difference, error)
 
 
 def _probability(value: float) -> str:

@@ -58,7 +58,7 @@ def _agreed(decision: Decision) -> str:
     if not decision.agreed:
         return ""
     names = listed(decision.agreed)
-    return f"Whatever is beside it, nearly all of the evidence has {names}. "
+    return f"Nearly all of the evidence contains {names}, whatever else is missing. "
 
 
 def _alike(decision: Decision) -> str:
@@ -172,14 +172,14 @@ def freed_value(nominal: Model, fitted: Model, chosen: Hypothesis) -> str | None
     freed = [name for name in chosen.elements if name not in effects]
     beside = f" with {listed(effects)}" if effects else ""
     values = [
-        f"{_of_body(name)} is held at {with_written_unit(f'{held.value:.4g}', held.unit)}. Freed it comes out at {fitted.value(name):.4g}"
+        f"{_of_body(name)} is fixed at {with_written_unit(f'{held.value:.4g}', held.unit)}. If it is free, it is estimated at {fitted.value(name):.4g}"
         for name, held in ((name, nominal.parameters[name]) for name in freed)
     ]
     what = "that value" if len(freed) == 1 else "these values"
     # the file of a body does not mark free parameters
     file = any(name.startswith(f"{BODY}.") for name in freed)
     return (
-        f"{'. '.join(values)}, and that{beside} predicts the records better than any effect does while it is held: check {what}"
+        f"{'. '.join(values)}, and this{beside} predicts the records better than any effect beside the fixed value: check {what}"
         f"{'' if file else ', or drop its ' + repr('fixed: true')}."
     )
 

@@ -25,7 +25,7 @@ def misfits(answers: Mapping[str, Diagnosis], braking: Mapping[str, str]) -> Ite
             continue
         yield (
             f"{joint}: the refitted nominal model misses {100.0 * nominal:.0f} % of the effort, and {100.0 * named:.0f} % with what was fitted "
-            "beside it: the body's file or the channels hardly fit; check that the file's inertias are those about the centres of mass, the "
+            "beside it: the body's file or the channels are probably wrong; check that the file's inertias are those about the centres of mass, the "
             "order and the signs of the joints, and the units"
         )
 
@@ -48,8 +48,8 @@ def late_efforts(found: Mapping[str, JointResult]) -> Iterator[str]:
     if len(late) > max(0.5 * len(fits), 1):
         by = min(-1e3 * fits[joint].alignment for joint in late)
         yield (
-            f"the efforts of {', '.join(late)} fit best {by:.3g} ms or more after the motion, which no machine does: they were filtered or stamped "
-            "late, and that may be what is left there; record them without a filter, or the positions with the same one"
+            f"the efforts of {', '.join(late)} fit best {by:.3g} ms or more after the motion, which is impossible: they were filtered or stamped "
+            "late, and this may be what is left there; record them without a filter, or the positions with the same one"
         )
 
 

@@ -338,7 +338,9 @@ def _with_effect(task: _Task, state: _State, grant: _Grant, last: bool) -> _Stat
     best = in_best_order(grant.winner, task.series, grant.noise, task.step)
     gained = state.gained + grant.gain + grant.winner.chi2 - best.chi2
     new = " and ".join(label for label in best.added if label not in state.best.added)
-    task.tell(f"{new} explains it better by {grant.gain:.0f}; looking for more")
+    task.tell(
+        f"{new} added: the information criterion (BIC) falls by {grant.gain:.0f}; looking for a further effect"
+    )
     current = whole_fit(best, task.series, grant.noise, task.step, pool=task.pool)
     state = replace(state.with_trials([best]), best=best, current=current, noise=grant.noise, gained=gained)
     if last or time_is_up():

@@ -103,7 +103,7 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
     elif condition > CONDITION:
         applies, reason = (
             False,
-            f"the motion does not tell the parameters apart (condition number {condition:.3g})",
+            f"the motion does not separate the parameters (condition number {condition:.3g})",
         )
     restoring = restores(balance, model, records[0].output_kind)
     means_something = restoring and not closed

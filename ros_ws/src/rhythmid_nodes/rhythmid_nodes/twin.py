@@ -245,7 +245,7 @@ class TwinNode(GraphNode):
         if status.level == "learning":
             return "learning the healthy machine"
         if status.level == "late":
-            return "messages come too late to tell of the physics"
+            return "messages come too late to be used"
         event = self._watch.events.current
         if event is None:
             return "the machine does what its model does"
