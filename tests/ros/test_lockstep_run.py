@@ -39,6 +39,10 @@ def test_lockstep_in_processes_equals_the_run_without_ros(rhythmid, tmp_path, of
         "run", experiment_file(tmp_path, time=time, record={"storage": "sqlite3"}, excitation=BRIEF)
     )
     assert done.returncode == 0, done.stderr
+    (none,) = {line.split()[0] for line in done.stderr.splitlines() if "clamped_commands" in line}
+    assert (
+        none == "none" and "lifecycle" not in done.stderr
+    )  # only what is not as it should be has a line of its own
     assert_equal_to(offline, tmp_path / "experiment_bag")
 
 

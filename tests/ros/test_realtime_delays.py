@@ -35,13 +35,18 @@ def other_work() -> Iterator[None]:
 
 
 def figures(summary: str) -> dict[str, dict[str, str]]:
-    """Node -> its figures, as the summary of a run prints them: the node's name stands before its first one."""
+    """Node -> its figures, as the summary of a run prints them: the node's name stands before its first one, and figures that are zero
+    stand together at its end."""
     found: dict[str, dict[str, str]] = {}
-    node = ""
+    node, zero = "", False
     for line in summary.splitlines():
         words = line.split()
         if words and words[0] in ("plant", "command_delay", "measurement_delay", "excitation", "recorder"):
-            node, words = words[0], words[1:]
+            node, words, zero = words[0], words[1:], False
+        zero = zero or words[:1] == ["none"]
+        if node and zero and line.startswith((node, " ")):
+            found.setdefault(node, {}).update(dict.fromkeys(" ".join(words).replace(",", " ").split(), "0"))
+            continue
         if (
             node
             and len(words) == 2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -22,8 +24,7 @@ def show(
         for _ in range(3):
             table.add_column(overflow="fold")
         for spec in experiment.nodes():
-            figures = observed.figures.get(spec.name, {})
-            for number, (key, value) in enumerate(figures.items()):
+            for number, (key, value) in enumerate(_rows(observed.figures.get(spec.name, {}))):
                 table.add_row(spec.name if number == 0 else "", key, escape(value))
         console.print(table)
     colour = "green" if outcome.code == 0 else "red"
@@ -32,3 +33,11 @@ def show(
     )
     for note in punctuality_notes(observed.run):
         console.print(f"[bold]{escape(note)}[/]")
+
+
+def _rows(figures: Mapping[str, str]) -> list[tuple[str, str]]:
+    """The figures of a node: one a row, those that are zero together in the last one. That a node is active goes without saying."""
+    figures = {key: value for key, value in figures.items() if (key, value) != ("lifecycle", "active")}
+    zero = [key for key, value in figures.items() if value in ("", "0")]
+    shown = [(key, value) for key, value in figures.items() if key not in zero]
+    return [*shown, ("none", ", ".join(zero))] if zero else shown
