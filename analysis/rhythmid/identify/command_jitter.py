@@ -62,7 +62,7 @@ class CommandJitter:
         """One sentence that describes the jitter."""
         return (
             f"single commands act earlier or later than the input delay says, by {1e3 * self.std:.3g} ± {1e3 * self.uncertainty:.1g} ms "
-            "(standard deviation); what that excites is weighed as noise of the machine's own colour"
+            "(standard deviation); the motion that this excites is modelled as coloured noise"
         )
 
 

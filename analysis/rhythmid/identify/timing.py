@@ -132,7 +132,7 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
         if period.value is not None and period.std is not None:
             notes.append(
                 f"the command acts as if the drive took a new one every {1e3 * period.value:.4g} ± {1e3 * period.std:.2g} "
-                "ms only; half of that is not in the input delay"
+                "ms only; the input delay does not contain half of that"
             )
     return found, tuple(notes)
 

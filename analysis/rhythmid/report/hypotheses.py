@@ -36,7 +36,7 @@ def hypotheses_section(found: Findings) -> Section:
     blocks: list[Block] = [
         Paragraph(
             "Each hypothesis is a model that was fitted to the records. It is scored by how well it predicts stretches of them that its "
-            "fit did not see; a simpler model is kept while the odds against it are below 40 to 1."
+            "fit did not use; a simpler model is kept while the odds against it are below 40 to 1."
         )
     ]
     columns = (
@@ -108,7 +108,7 @@ def _evidence(
             f"Hypotheses by how much worse than the best they predict: {words}.", made, LEAST_ODDS, "40 to 1",
             "weight",
         ),
-        "By how much each predicts worse than the best one the stretches that its fit did not see, ± one standard error. Right of the "
+        "How much worse than the best hypothesis each predicts stretches that its fit did not use, ± one standard error. Right of the "
         "dotted line the odds against a hypothesis are more than 40 to 1. A dash: it has more effects than the chosen one.",
         tuple(pair for pair in legend if any(f"circle {one.style}" == pair[0] for one in made)),
     )  # fmt: skip

@@ -44,7 +44,7 @@ FOUND_BY = {
     "reaches show the errors.",
     "local_rational": "The functions were fitted locally, with transients, around each frequency; what the fit leaves shows the errors.",
     "regularised_least_squares": "The functions were smoothed along frequency by regularised least squares, the paper's equation (5), "
-    "for the excitation allows no other way.",
+    "because the excitation allows no other method.",
 }
 
 

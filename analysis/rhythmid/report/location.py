@@ -115,8 +115,8 @@ def _slot_scores(found: Findings) -> Drawing | None:
             found.threshold,
             "chance",
         ),
-        "How strongly the best element of each slot would explain the mismatch (χ² of its score test). Beyond the dotted line "
-        "chance is no explanation. The final say is with the refits below.",
+        "How strongly the best element of each slot would explain the mismatch (χ² of its score test). Scores beyond the dotted line "
+        "are not due to chance. The refits below decide.",
     )
 
 
@@ -238,5 +238,5 @@ def _force_map(one: FreeFunction, repaired: bool) -> Drawing:
             f"{kind} [{pretty_unit(unit)}]", tuple(curves),
         ),
         f"The mismatch as a free function of {one.quantity}, no formula assumed; it {words}. Left out: what the nominal "
-        f"model's own parameters can take up (an offset; a slope over position or velocity).{reading}",
+        f"model's own parameters can absorb (an offset; a slope over position or velocity).{reading}",
     )  # fmt: skip

@@ -136,8 +136,8 @@ def _over_cycle(run: Run, factor: float, unit: str) -> Drawing | None:
             f"{run.name}: mean residual over the phase of the forcing.", "phase of the forcing [cycles]",
             f"mean residual [{pretty_unit(unit)}]", tuple(curves), x_range=(0.0, 1.0),
         ),
-        "The residual averaged over all cycles, from the forcing's peak (0) to the next (1). Bands: 95 % of the mean. Where "
-        "a band leaves out zero, the mismatch comes back in every cycle.",
+        "The residual averaged over all cycles, from the forcing's peak (0) to the next (1). Bands: 95 % intervals of the mean. Where "
+        "a band does not contain zero, the mismatch recurs in every cycle.",
     )  # fmt: skip
 
 
@@ -159,7 +159,7 @@ def _over_states(run: Run, length: str, factor: float, unit: str) -> Drawing:
             f"{run.name}: mean residual over position x and velocity v{', before and after' if len(maps) > 1 else ''}.",
             maps, (x_unit[0], pretty_unit(x_unit[1])), (1.0, pretty_unit(rate)), (factor, pretty_unit(unit)),
         ),
-        "Mean residual wherever the machine has been. Patches of one colour say in which states the model errs"
+        "Mean residual wherever the machine has been. Patches of one colour show in which states the model is wrong"
         + ("; after a good repair no patch is left." if len(maps) > 1 else "."),
     )  # fmt: skip
 
@@ -180,7 +180,7 @@ def _over_frequency(run: Run, compared: Compared) -> Drawing:
             f"{run.name}: amplitude spectral density of the {compared.quantity} and of what the models miss of it.",
             "frequency [Hz]", f"density [{pretty_unit(unit)}/√Hz]", tuple(curves), y_log=True, x_log=True,
         ),
-        f"Spectra of the {compared.quantity} and of the residuals. Peaks that go are what was missing; a flat floor that stays is "
+        f"Spectra of the {compared.quantity} and of the residuals. Peaks that disappear are what was missing; a flat floor that remains is "
         "measurement noise.",
     )  # fmt: skip
 

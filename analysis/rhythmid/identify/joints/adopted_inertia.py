@@ -58,8 +58,8 @@ def adopted_inertia(
         return None
     most = max(before, key=lambda joint: before[joint] - after[joint])
     note = (
-        f"the links have the inertias that were fitted to the efforts: with them the effort of {most} is missed by {100.0 * after[most]:.3g} % of it "
-        f"where no fit has seen it, with the file's by {100.0 * before[most]:.3g} %"
+        f"the links have the inertias that were fitted to the efforts: on held-out data they miss {100.0 * after[most]:.3g} % of the effort of "
+        f"{most}, those of the file {100.0 * before[most]:.3g} %"
     )
     return Adopted(made, models, better, note)
 

@@ -304,7 +304,7 @@ def _warning(joint: str, runs: Mapping[str, Mapping[str, float]]) -> str:
     before, after = (100.0 * runs[name][joint] for name in ("given", "identified"))
     return (
         f"{joint}: the identified values predict the motion worse ({after:.3g} % of it is missed) than the given ones ({before:.3g} %); do not "
-        "use them: an effort of another scale or instant, or an effect that the model lacks, is in them; try `rhythmid diagnose`"
+        "use them: the effort may have another scale or other instants than stated, or the model lacks an effect; try `rhythmid diagnose`"
     )
 
 
