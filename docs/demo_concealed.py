@@ -19,6 +19,7 @@ from rich.console import Console
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
+from rhythmid.report.quantity import with_std
 
 ROOT = Path(__file__).parents[1]
 NOMINAL = ROOT / "analysis/rhythmid/models/paper_hopper.yaml"
@@ -116,9 +117,7 @@ def main() -> None:
         for name, value in effect["parameters"].items():
             true = truth["values"].get(name) if effect["element"] == truth["element"] else None
             beside = "" if true is None else f"   (true {true:.4g})"
-            console.print(
-                f"  {effect['element']}.{name} = {value['value']:.4g} ± {value['std'] or 0:.2g}{beside}"
-            )
+            console.print(f"  {effect['element']}.{name} = {with_std(value['value'], value['std'])}{beside}")
     for name in ("input", "measurement"):
         delay = found["delays"][name]
         console.print(

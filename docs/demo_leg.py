@@ -20,6 +20,7 @@ from rich.console import Console
 
 from rhythmid.body.machine import Machine
 from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.report.quantity import with_std
 
 ROOT = Path(__file__).parents[1]
 LEGS = Path(str(files("rhythmid"))) / "models" / "legs"
@@ -81,9 +82,7 @@ def main() -> None:
         for name, value in effect["parameters"].items():
             true = truth["values"].get(name) if right else None
             beside = "" if true is None else f"   (true {true:.4g})"
-            console.print(
-                f"  {effect['joint']}: {name} = {value['value']:.4g} ± {value['std'] or 0:.2g}{beside}"
-            )
+            console.print(f"  {effect['joint']}: {name} = {with_std(value['value'], value['std'])}{beside}")
     console.print(f"report: {report}\naugmented model: {augmented}")
 
 

@@ -48,7 +48,7 @@ def both(delays: Delays) -> tuple[float | None, float | None]:
 def test_forcing_on_the_robot_gives_both_delays_and_prints_the_assumption(joint):
     found = delays_of(joint)
     assert found.separable and found.input.value == pytest.approx(0.04, abs=2e-4)
-    assert "undelayed" in found.assumption and "δ_f = 0" in found.assumption
+    assert "without delay" in found.assumption and "δ_f = 0" in found.assumption
 
 
 def test_the_closure_of_a_right_model_is_near_zero(joint):

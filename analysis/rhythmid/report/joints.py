@@ -26,14 +26,13 @@ from rhythmid.report.chart import Chart, Curve
 from rhythmid.report.page import Page, Tone
 from rhythmid.report.quantity import (
     NONE,
-    number,
+    estimate,
     percent,
     plain,
     pretty_name,
     pretty_unit,
     probability,
     sentence,
-    with_unit,
 )
 from rhythmid.report.robot_figure import DrawnJoint, robot_svg
 from rhythmid.report.sections import reproduce_section
@@ -101,7 +100,7 @@ def _at(effect: Mapping[str, Any]) -> str:
 def _robot(robot: Sequence[DrawnJoint]) -> Block:
     faulty = [f"{one.name} ({one.fault})" for one in robot if one.fault]
     alt = f"The robot's joints; marked: {', '.join(faulty) or 'none'}"
-    words = "Circles are revolute joints, squares prismatic ones. At red joints physics is missing: ! with a name, ? without."
+    words = "Circles are revolute joints, squares prismatic ones. Red: physics is missing there; ! if it has a name, ? if not."
     return Drawing("The robot", robot_svg(robot, alt), words, wide=True)
 
 
@@ -138,10 +137,9 @@ def _missing(result: Mapping[str, Any]) -> list[Block]:
         blocks.append(Equation(one["equation"]))
         rows = []
         for name, value in one["parameters"].items():
-            std = NONE if value["std"] is None else number(value["std"], 2)
-            rows.append((name, with_unit(number(value["value"], 4), value["unit"]), std))
+            rows.append((name, estimate(value["value"], value["std"], value["unit"])))
         blocks.append(
-            Table(f"Parameters at {_place(one)}", ("parameter", "value", "standard deviation"), tuple(rows))
+            Table(f"Parameters at {_place(one)}, with 95 % intervals.", ("parameter", "value"), tuple(rows))
         )
     return blocks
 
@@ -184,7 +182,7 @@ def _efforts(result: Mapping[str, Any], curves: Mapping[str, JointCurves]) -> li
             ),
         )
         shown = drawing(
-            joint, chart, "Both are filtered as for the evidence. Nominal: the joint's path, refitted.",
+            joint, chart, "All are filtered as for the evidence. Nominal: the joint's path, refitted. Straight lines bridge samples that are left out, such as those in contact.",
         )  # fmt: skip
         faulty = result["joints"][joint]["verdict"] != "consistent"
         blocks.append(shown if faulty else Fold(f"{joint}: consistent", (shown,)))

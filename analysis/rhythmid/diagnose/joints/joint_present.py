@@ -1,15 +1,19 @@
 """Report of a diagnosis of several joints."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rhythmid.body.machine import Machine
 from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.body.robot_tree import parents_of
 from rhythmid.diagnose.joints.joint_diagnosis import MachineAnswer
+from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.report.joints import JointCurves, joints_page
 from rhythmid.report.page import Page
 from rhythmid.report.quantity import pretty_name
 from rhythmid.report.robot_figure import DrawnJoint
+
+Array = NDArray[np.float64]
 
 
 def present_machine(answer: MachineAnswer, nominal: Machine, source: str, command: str) -> Page:
@@ -46,10 +50,20 @@ def _curves(answer: MachineAnswer, machine: Machine) -> dict[str, JointCurves]:
     for joint, one in answer.results.items():
         before = answer.given.get(joint, one)
         balance = one.result.search.balance
-        first = len(balance.places[0])  # number of rows of the first motion
-        time = balance.motions[0].time[np.asarray(balance.places[0], dtype=int)]
-        measured = balance.measured[:first]
-        nominal, augmented = (fit.fit.residual[:first] for fit in (before.result.nominal, one.result.chosen))
+        time = _of_first_record(balance)
+        measured = balance.measured[: len(time)]
+        nominal, augmented = (
+            fit.fit.residual[: len(time)] for fit in (before.result.nominal, one.result.chosen)
+        )
         unit = "N*m" if machine.body.joints[joint].rotational else "N"
         found[joint] = JointCurves(time, measured, measured + nominal, measured + augmented, unit)
     return found
+
+
+def _of_first_record(balance: Balance) -> Array:
+    """Times (n,) [s] of the rows of the first record: it may be in many stretches, such as flights between contacts."""
+    first = balance.motions[0].record
+    stretches = zip(balance.motions, balance.places, strict=True)
+    return np.concatenate(
+        [motion.time[np.asarray(places, dtype=int)] for motion, places in stretches if motion.record == first]
+    )
