@@ -16,7 +16,7 @@ from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
 TIME = 0.01 * np.arange(200)
-NOISE = np.random.default_rng(3).standard_normal((4, len(TIME)))
+NOISE = np.random.default_rng(5).standard_normal((4, len(TIME)))
 MODEL = Model.from_text(
     "inertia: {mass: {value: 0.1}}\nforce: [viscous_damper: {damping: {value: 0.2}}]", "model.yaml"
 )
