@@ -46,7 +46,7 @@ def unsigned_roles(record: Record) -> list[str]:
         if channel is None or (role == "input" and record.input_kind != "force"):
             continue
         at_once = np.interp(output.time, channel.time, channel.value)
-        if is_unsigned(output.time, output.value, at_once, asked, record.output_kind == "velocity"):
+        if is_unsigned(output.time, output.value, at_once, asked, is_speed=record.output_kind == "velocity"):
             found.append(role)
     return found
 
@@ -72,7 +72,7 @@ def _asked(record: Record) -> Array | None:
 
 
 def is_unsigned(
-    time: Array, motion: Array, effort: Array, reference: Array | None = None, is_speed: bool = False
+    time: Array, motion: Array, effort: Array, reference: Array | None = None, *, is_speed: bool = False
 ) -> bool:
     """Whether an effort (n,) is that of a motion (n,) without its sign.
 
