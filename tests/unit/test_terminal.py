@@ -123,14 +123,6 @@ def test_json_on_standard_output_is_nothing_but_json(bag, rhythmid):
     assert "joint_states" in done.stderr  # the report for people goes where it does not disturb
 
 
-@pytest.mark.parametrize("width", [40, 80])
-def test_the_lines_of_a_check_fit_a_terminal_without_a_broken_word(bag, width):
-    whole = python_m("check", bag).stdout.splitlines()
-    lines = python_m("check", bag, COLUMNS=str(width)).stdout.splitlines()
-    assert max(len(line) for line in lines if str(bag) not in line) <= width < max(map(len, whole))
-    assert " ".join(lines).split() == " ".join(whole).split()
-
-
 def test_several_recordings_are_checked_one_after_the_other_and_listed_as_json(bag, command, tmp_path):
     both = command("check", bag, bag)
     assert (both.code, both.out.count("joint_states")) == (

@@ -64,14 +64,14 @@ def check(
     records = [found.record for found in made if found.usable and found.record is not None]
     elsewhere = separate_zeros_notes(records)
     for line in elsewhere:
-        terminal.tell(f"note: {line}")
+        terminal.say(f"note: {line}")
     if model is not None:
         from rhythmid.commands.model_line import model_lines
 
         try:
             of_joints = joint_records([found.path for found in made if found.usable], signals)
             for line in model_lines(model, records, elements or (), of_joints):
-                terminal.tell(line)
+                terminal.say(line)
         except InputError as error:
             refused.append(str(error))
     if json is not None and made:
@@ -112,5 +112,5 @@ def _reported(
         made.append(found)
         refused += found.problems
         for line in found.lines():
-            terminal.tell(line)
+            terminal.say(line)
     return made, refused

@@ -2,7 +2,6 @@
 
 import os
 from pathlib import Path
-from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from rhythmid.output import STANDARD_OUTPUT
@@ -12,7 +11,6 @@ if TYPE_CHECKING:
 
     from rhythmid.report.page import Page
 
-INDENT = 4  # columns by which the rest of a long line of a report is indented
 WHOLE = 100_000  # columns if their number is unknown, as in a file: longer than any line
 
 
@@ -31,15 +29,6 @@ class Terminal:
     def say(self, line: str) -> None:
         """Print one line of the answer as it is; a long one is not broken."""
         self.answer.print(line, markup=False, highlight=False, soft_wrap=True)
-
-    def tell(self, line: str) -> None:
-        """Print a line of a report; on a narrower terminal its rest stands below, indented, and no word is broken."""
-        begin = line[: len(line) - len(line.lstrip())]
-        rest = f"{begin}{'':{INDENT}}"
-        for part in wrap(
-            line, self.answer.width, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
-        ):
-            self.say(part)
 
     def report(self, path: Path, page: "Page") -> None:
         """Write a report, and say where it is."""
