@@ -34,8 +34,8 @@ RUNS = 24  # of a batch that is interrupted after the first answer: more than ar
 def folder(tmp_path) -> Path:
     """A table of a mass on a spring with friction, and the files that describe it; what one command leaves is no other's."""
     machine = Model.from_text(NOMINAL).with_element(load_catalogue()["coulomb_friction"], {"force": 0.3})
-    time = np.arange(6000) / 300.0
-    command = build({"type": "multisine", "rms": 3.0, "period": 10.0, "periods": 2, "band": [0.3, 6.0]})(time)
+    time = np.arange(30_000) / 300.0  # long enough for the work to go on when the interrupt comes
+    command = build({"type": "multisine", "rms": 3.0, "period": 10.0, "periods": 10, "band": [0.3, 6.0]})(time)
     output = simulate(machine, time, zero_order_hold(time, command)).output
     output += np.random.default_rng(0).normal(0.0, 2e-5, len(time))
     table = np.column_stack([time, command, output])
@@ -85,7 +85,7 @@ def test_ctrl_c_ends_with_130_and_leaves_neither_files_nor_processes(folder, com
     assert process.stderr is not None
     told: list[str] = []
     assert any(told.append(line) or stage in line for line in process.stderr), told
-    time.sleep(0.3)  # into the work that was told
+    time.sleep(0.1)  # into the work that was told
     if to == "terminal":
         os.killpg(process.pid, signal.SIGINT)
     else:
