@@ -35,7 +35,9 @@ def folder(tmp_path) -> Path:
     """A table of a mass on a spring with friction, and the files that describe it; what one command leaves is no other's."""
     machine = Model.from_text(NOMINAL).with_element(load_catalogue()["coulomb_friction"], {"force": 0.3})
     time = np.arange(30_000) / 300.0  # long enough for the work to go on when the interrupt comes
-    command = build({"type": "multisine", "rms": 3.0, "period": 10.0, "periods": 10, "band": [0.3, 6.0]})(time)
+    command = build({"type": "multisine", "rms": 3.0, "period": 10.0, "periods": 10, "band": [0.3, 6.0]})(
+        time
+    )
     output = simulate(machine, time, zero_order_hold(time, command)).output
     output += np.random.default_rng(0).normal(0.0, 2e-5, len(time))
     table = np.column_stack([time, command, output])
