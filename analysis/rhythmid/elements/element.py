@@ -116,14 +116,12 @@ class Scales:
     rest: float | None = None  # position at which the model's linear spring is at rest, where that is known
     displaced_base: bool = False  # whether the input displaces the base that the leg stands on
     idle: bool = False  # whether no command, forcing or controller drives the machine: it moves freely
-    # times at which the recorded drive passes through one level in the same direction in one record, at most `OFTEN_ENOUGH`: 0 for another level in each
-    # record, 1 for a step with which the records begin
+    # times at which the recorded drive passes through one level in the same direction in one record, at most `OFTEN_ENOUGH`: 0 for
+    # another level in each record, 1 for a step with which the records begin
     changes: int = OFTEN_ENOUGH
     swings: tuple[float, float] = (0.0, 0.0)  # [Hz] lowest and highest frequency of a free oscillation
     comes_back: bool = True  # whether the position moves back and forth in some record
-    pressed: bool = (
-        True  # whether the machine is held at an end of its travel against its drive in some record
-    )
+    pressed: bool = True  # whether some record holds the machine at an end of its travel against its drive
     once: bool = False  # whether every record passes through each of its speeds only once, as a machine that coasts down
     # smallest, mean and largest value and standard deviation of what the sensor measures, where that is not the position of
     # the mass that the forces act on: its speed, or its position beside that relative to a moving base

@@ -45,9 +45,8 @@ def _block_averages(run: FreeRun, index: int, model: Model, start: Array) -> Arr
     every = replace(
         one, block=1, time=times, value=np.zeros(len(times)), used=np.ones(len(times), bool), hidden=None
     )
-    fine = with_series(
-        run, index, every
-    )  # steps end at the knots of a command that a smooth surrogate may replace
+    # steps end at the knots of a command that a smooth surrogate may replace
+    fine = with_series(run, index, every)
     rows = replace(fine, max_step=0.5 * run.max_step).rows(model, index, start)
     return None if rows is None else rows[1:, run.states].reshape(-1, one.block).mean(axis=1)
 

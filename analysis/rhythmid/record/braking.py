@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-TAKEN = (
-    -0.5
-)  # share of the power's size that its mean has to reach: three quarters of the power are then taken out
-EACH_WAY = (
-    0.25  # least share of the time in either direction: a machine that is slowed down once moves in one
-)
+# share of the power's size that its mean has to reach: three quarters of the power are then taken out
+TAKEN = -0.5
+# least share of the time in either direction: a machine that is slowed down once moves in one
+EACH_WAY = 0.25
 GOES_ON = 0.7  # ratio of the motion's size in the last third to that in the first, below which it dies away
-LEAST_SAMPLES = 100
+LEAST_SAMPLES = 100  # of a record that is judged, as for efforts without a sign
 WHY = (
     "it takes energy out of a motion that goes on: its sign is opposite to the motion's (scale: -1), as that of a force which the machine "
     "exerts, or what drives the machine was not recorded"

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 END = 0.05  # share of the travel beside an end within which a machine is at that end
 SLOW = 0.03  # share of the fast speed (its 95 % quantile) below which a machine rests, as in the balance of forces
-DRIVES = (
-    0.1  # share of the largest drive above which it moves the machine, and does not only ripple about zero
-)
-LEAST_SHARE = (
-    0.05  # least length of such a rest, as a share of the record: a shorter one may be the turn of a motion
-)
+# share of the largest drive above which it moves the machine, and does not only ripple about zero
+DRIVES = 0.1
+# least length of such a rest, as a share of the record: a shorter one may be the turn of a motion
+LEAST_SHARE = 0.05
 
 
 def some_part_is_pressed(parts: Iterable[tuple[Array, Array, Array]]) -> bool:
