@@ -1,7 +1,8 @@
 """What lies in a case's folder: records that `rhythmid` reads, a nominal model, and answers that can be scored again."""
 
 import json
-from dataclasses import asdict
+import shutil
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 from typing import get_args
@@ -9,6 +10,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from contests import contest, predicted, supposed
+from matplotlib.figure import Figure
 
 from rhythmid.commands.proof import Machines
 from rhythmid.diagnose.replay import ledger
@@ -21,7 +23,10 @@ from rhythmid.proof.draw import draw_case
 from rhythmid.proof.examine import _records
 from rhythmid.proof.machines.designs import DESIGNS
 from rhythmid.proof.perform import JUDGE, LEARN, NOMINAL, perform
-from rhythmid.proof.replay import replay_campaign, told_hashes
+from rhythmid.proof.pool import pool
+from rhythmid.proof.reliability import draw_reliability
+from rhythmid.proof.replay import replay_campaign, replayed, told_hashes
+from rhythmid.proof.score import Stated
 from rhythmid.proof.seal import seal, truth_of
 from rhythmid.record.read import load_records
 
@@ -119,6 +124,30 @@ def test_kept_answers_are_scored_by_a_verdict_reached_anew_without_touching_the_
     assert "--replay" in (out / "replay.md").read_text()
     assert json.loads((out / "replay.json").read_text())["cases"][0]["case"] == one.case
     assert {path: path.read_bytes() for path in before} == before
+
+
+def test_campaigns_have_one_card_and_one_reliability_diagram_together(kept, tmp_path):
+    out, campaign = kept
+    other, card = tmp_path / "other", tmp_path / "card"
+    shutil.copytree(out, other)
+    scores = pool(card, [out, other])
+    assert [one.case.split("/")[0] for one in scores] == ["out", "other"]
+    written = json.loads((card / "proof.json").read_text())
+    assert written["commands"] == [f"{campaign.command}: 1 of 1"] * 2
+    assert written["null"]["rates"]["something named"]["hits"] == 2
+    assert sum(row["right"]["of"] for row in written["reliability"]) == 2
+    assert (card / "reliability.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(InputError, match="holds no campaign"):
+        pool(card, [out, tmp_path / "nowhere"])
+
+
+def test_the_reliability_diagram_draws_a_law_that_the_catalogue_lacks_apart(kept):
+    out, campaign = kept
+    ((known,), _) = replayed(out, campaign.tasks)
+    axis = Figure().subplots()
+    draw_reliability(axis, [known, replace(known, kind="left-out", stated=(Stated("a", 0.9, True),))])
+    shares = [list(drawn.lines[0].get_ydata()) for drawn in axis.containers]
+    assert shares == [[0.0], [1.0]]
 
 
 def test_a_folder_without_answers_cannot_be_replayed(tmp_path):

@@ -21,6 +21,7 @@ Machines = Literal["hopper", "axis", "joint", "pendulum", "shaken", "servo", "de
 EXAMPLES = (
     "rhythmid proof --cases 8 --kind single --out folder",
     "rhythmid proof --out folder --resume",
+    "rhythmid proof --pool single --pool null --out card",
 )
 
 
@@ -49,6 +50,13 @@ def proof(
     again: Annotated[
         bool, typer.Option("--replay", help="Score the answers in --out again, without simulating.")
     ] = False,
+    pooled: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--pool",
+            help="Score the answers of this campaign's folder, without simulating; may be repeated for one card of all.",
+        ),
+    ] = None,
     only: Annotated[list[str] | None, typer.Option("--only", help="Only this case; may be repeated.")] = None,
     keep: Annotated[bool, typer.Option("--keep-bags", help="Keep the records of finished cases.")] = False,
     quiet: Quiet = False,
@@ -70,6 +78,9 @@ def proof(
     console = terminal.answer
     if again:
         _replay(out, console, chosen)
+        return
+    if pooled:
+        _pool(out, pooled, console)
         return
     campaign = Campaign(seed, kind, cases, machine, cluttered, budget)
     tasks = chosen(campaign)
@@ -120,3 +131,14 @@ def _replay(out: Path, console: "Console", chosen) -> None:
     print_markdown(console, (out / "replay.md").read_text(encoding="utf-8"))
     console.print(f"{len(scores)} answers scored, {anew} of them decided anew from their evidence")
     console.print(f"{out / 'replay.md'}, {out / 'replay.json'}")
+
+
+def _pool(out: Path, folders: list[Path], console: "Console") -> None:
+    """Score kept answers of several campaigns together."""
+    from rhythmid.proof.pool import pool
+    from rhythmid.report.terminal_table import print_markdown
+
+    scores = pool(out, folders)
+    print_markdown(console, (out / "proof.md").read_text(encoding="utf-8"))
+    console.print(f"{len(scores)} answers of {len(folders)} campaign{'s' if len(folders) > 1 else ''} scored")
+    console.print(f"{out / 'proof.md'}, {out / 'proof.json'}, {out / 'reliability.png'}")

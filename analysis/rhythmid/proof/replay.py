@@ -29,10 +29,10 @@ def told_hashes(out: Path) -> dict[str, str]:
     return {case: told for _, told, case in lines}
 
 
-def replay_campaign(out: Path, campaign: Campaign, tasks: Sequence[Task]) -> tuple[list[Score], int]:
-    """Score the stored answers of these cases, and write `replay.md` and `replay.json` beside the campaign's own card.
+def replayed(out: Path, tasks: Sequence[Task]) -> tuple[list[Score], int]:
+    """Scores of the stored answers of these cases, and the number of verdicts that were derived again.
 
-    Returns the scores and the number of verdicts that were derived again. Raises InputError where no answer was stored.
+    Raises InputError where no answer was stored.
     """
     told, catalogue = told_hashes(out), load_catalogue()
     scores: list[Score] = []
@@ -47,6 +47,15 @@ def replay_campaign(out: Path, campaign: Campaign, tasks: Sequence[Task]) -> tup
         scores.append(score(truth, redecide(answer), catalogue))
     if not scores:
         raise InputError(f"{out}: holds no answer yet; nothing can be replayed")
+    return scores, anew
+
+
+def replay_campaign(out: Path, campaign: Campaign, tasks: Sequence[Task]) -> tuple[list[Score], int]:
+    """Score the stored answers of these cases, and write `replay.md` and `replay.json` beside the campaign's own card.
+
+    Returns and raises what `replayed` does.
+    """
+    scores, anew = replayed(out, tasks)
     write_text(out / "replay.md", markdown(scores, f"{campaign.command} --replay", len(scores) == len(tasks)))
     write_json(out / "replay.json", {"command": f"{campaign.command} --replay", **summary(scores)})
     return scores, anew
