@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import fuzz_bags as bags
+import fuzz_formats as formats
 import fuzz_tables as tables
 from fuzz_tables import TABLE
 from mutation import Mutation, spoil_bytes, spoil_text
@@ -140,5 +141,15 @@ TARGETS = {
         Target("npz", tables.npz_parts, tables.spoil_npz, tables.use_table(".npz")),
         Target("mat", tables.mats, spoil_bytes, tables.use_table(".mat")),
         Target("parquet", tables.parquets, spoil_bytes, tables.use_table(".parquet")),
+        Target("dialect", formats.dialects, spoil_text, tables.use_table(".txt")),
+        Target("folder", formats.folders, spoil_text, formats.use_folder),
+        Target("xlsx", formats.workbooks, formats.spoil_workbook, tables.use_table(".xlsx")),
+        Target("h5", formats.hdf5s, spoil_bytes, tables.use_table(".h5")),
+        Target("npy", formats.npys, spoil_bytes, tables.use_table(".npy")),
+        Target("object", formats.objects, spoil_bytes, tables.use_table(".mat")),
+        Target("init", formats.long_tables, spoil_text, formats.use_init),
+        Target("split", formats.several_runs, spoil_text, formats.use_split),
+        Target("robot", formats.robots, spoil_text, formats.use_robot),
+        Target("profile", formats.profiles, spoil_text, formats.use_profile),
     )
 }  # fmt: skip
