@@ -103,6 +103,7 @@ class Supervisor:
             end(self._processes, self._listen)  # the recorder still receives the last messages of the others
             for process in self._processes:
                 process.join_output()
+            outcome = self._with_refusal(outcome)
             self.observed.figures, self.observed.run = observer.figures, observer.run
         finally:
             for process in self._processes:
@@ -155,6 +156,13 @@ class Supervisor:
             self._listen()  # it may have reported the reason
             return _cause(observer) or _death(dead)
         return Outcome(0, "stopped by the user") if self._interrupted() else None
+
+    def _with_refusal(self, outcome: Outcome) -> Outcome:
+        """The outcome, led by what a node refused or could not write: its end may have stopped another node before it was noticed itself."""
+        refused = next((process.refusal for process in self._processes if process.refusal), "")
+        if not refused or not self._began:
+            return outcome
+        return Outcome(1, refused if refused in outcome.sentence else f"{refused}; {outcome.sentence}")
 
     def _stopped_working(self, observer: Observer) -> Outcome | None:
         """A node that is alive but does not work. A silent one is killed, so that it cannot act after the run."""
