@@ -1,6 +1,7 @@
 """Managed nodes over real topics and the standard services: what each does in its states, and what comes of the effort."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -253,6 +254,22 @@ def test_use_sim_time_is_refused_in_one_line(graph):
     graph.add(DelayInjector, {"input": "here", "output": "there"})
     answer = graph.set_parameter("delay_injector", "use_sim_time", True)
     assert not answer.successful and "/clock" in answer.reason
+
+
+@pytest.mark.parametrize("label", ["configure", "shutdown"])
+def test_who_ends_a_node_by_a_transition_gets_its_answer_although_it_was_busy(graph, label):
+    spawned = graph.spawn("recorder", "recorder", autostart=False)
+    assert state(graph, "recorder") == "unconfigured"
+    client = graph.probe.create_client(ChangeState, "recorder/change_state")
+    graph.until(client.service_is_ready, "the service")
+    answer = client.call_async(ChangeState.Request(transition=Transition(label=label)))
+    subprocess.run(
+        ["sh", "-c", f"kill -STOP {os.getpid()}; sleep 0.5; kill -CONT {os.getpid()}"], check=True
+    )  # the middleware of this process stands still, too
+    graph.until(answer.done, "the answer")
+    assert answer.result().success == (label == "shutdown")
+    graph.until(lambda: spawned.returncode is not None, "the end")
+    assert spawned.returncode == (2 if label == "configure" else 0)
 
 
 def test_what_configure_refuses_ends_the_process_in_one_line(graph):

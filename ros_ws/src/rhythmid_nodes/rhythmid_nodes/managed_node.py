@@ -157,6 +157,11 @@ class ManagedNode(LifecycleNode):
         died = (worker.failure for worker in self.workers if worker.failure is not None)
         return self._refusal or next(died, None)
 
+    @property
+    def ended_by_transition(self) -> bool:
+        """Whether a transition ends the process: one that failed, or shutdown."""
+        return self._refusal is not None or self.managed_state == FINALIZED
+
     def end(self) -> None:
         """Request the end of the process."""
         self.done = True

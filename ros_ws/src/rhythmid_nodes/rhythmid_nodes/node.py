@@ -35,6 +35,7 @@ _PR_SET_PDEATHSIG = 1
 _SUPERVISOR = "RHYTHMID_SUPERVISOR"  # process id of the supervisor, which itself says what is waited for
 _WAITING_PERIOD = 0.5  # seconds between two checks whether the node still waits
 _LAST_WORDS = 0.1  # seconds
+_ANSWERING = 1.0  # seconds in which the answer to a request that ends the node is received: the middleware discards the messages of a node that has gone
 _NAMING = (
     2.0  # seconds that a tripped node waits for the name of a foreign node, which arrives after its messages
 )
@@ -226,26 +227,28 @@ def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int
 
 
 def _spin(executor: Executor, nodes: Sequence[GraphNode], asked: list[int]) -> None:
-    """Serve callbacks until `asked` is filled by a signal or a node is done, and a moment more for what has been
-    delivered but not yet served; raises what a worker died of."""
+    """Serve callbacks until `asked` is filled by a signal or a node is done or has failed, and a moment more for what has been
+    delivered but not yet served, or longer for the answer to a request that has ended a node; raises what a node failed of."""
     gc.collect()
     gc.freeze()  # later collections look at young objects only, which takes microseconds
     for node in nodes:
         node.begin()
     look_at = 0.0
     end_at = math.inf
+    failure: BaseException | None = None
     while time.monotonic() < end_at:
         executor.spin_once(timeout_sec=0.1)  # EventsExecutor.spin() never returns on a signal
         if asked or time.monotonic() > look_at:
             look_at = time.monotonic() + 0.1
-            failure = next((node.failure for node in nodes if node.failure is not None), None)
-            if failure is not None:
-                raise failure
-            if end_at == math.inf and (asked or any(node.done for node in nodes)):
-                end_at = time.monotonic() + _LAST_WORDS
+            failure = failure or next((node.failure for node in nodes if node.failure is not None), None)
+            if end_at == math.inf and (asked or failure is not None or any(node.done for node in nodes)):
+                requested = not asked and any(node.ended_by_transition for node in nodes)
+                end_at = time.monotonic() + (_ANSWERING if requested else _LAST_WORDS)
                 for node in nodes:
                     if node.configured:
                         node.stand_down()
+    if failure is not None:
+        raise failure
 
 
 def run(build: Callable[[], GraphNode]) -> None:
