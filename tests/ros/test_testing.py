@@ -1,4 +1,4 @@
-"""`rhythmid.testing`: what its page shows runs as printed, and a node that fails makes the test fail with what it said."""
+"""`rhythmid.testing`: what the README and its page show runs as printed, and a node that fails makes the test fail with what it said."""
 
 import os
 import re
@@ -29,8 +29,9 @@ def run_tests(folder: Path, text: str, *options: str) -> subprocess.CompletedPro
     )  # fmt: skip
 
 
-def test_the_example_of_the_page_runs_as_printed(tmp_path):
-    page = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("document", ["README.md", "docs/testing.md"])
+def test_the_example_runs_as_printed(tmp_path, document):
+    page = (ROOT / document).read_text(encoding="utf-8")
     shown = re.search(r"```python\n(# test_my_filter.py\n.*?)```", page, re.DOTALL)
     assert shown is not None
     done = run_tests(tmp_path, shown[1])
