@@ -1,13 +1,21 @@
-"""The launch file says the same nodes as the experiment; ROS's launch itself is not available from PyPI: a substitute."""
+"""The launch file says the same nodes as the experiment, with a substitute for ROS's launch, which PyPI does not have; and where
+launch is installed, what really comes of it."""
 
 import importlib.util
+import os
+import re
+import signal
+import subprocess
 import sys
+import time
 import types
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
 from lifecycle_msgs.msg import Transition
+from patience import LONG, PATIENCE
+from short_run import content, experiment_file
 
 from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
@@ -94,6 +102,61 @@ def test_any_nodes_end_shuts_it_down_with_that_nodes_exit_code(
     assert type(action).__name__ == "Shutdown" and "plant-1" in action.keywords["reason"]
     assert launch_file.shut_down(event, types.SimpleNamespace(is_shutdown=True)) == []
     assert exits == ([] if expected is None else [expected])
+
+
+LAUNCH = """
+import sys
+from launch import LaunchDescription, LaunchService
+from launch.actions import IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+source = PythonLaunchDescriptionSource(sys.argv[1])
+arguments = [tuple(word.split(":=", 1)) for word in sys.argv[2:]]
+service = LaunchService()
+service.include_launch_description(LaunchDescription([IncludeLaunchDescription(source, launch_arguments=arguments)]))
+sys.exit(service.run())
+"""
+
+
+def prefix(folder: Path) -> Path:
+    """A prefix with the executables of the nodes, as an installation of the package has them."""
+    marker = folder / "share" / "ament_index" / "resource_index" / "packages" / "rhythmid_nodes"
+    marker.parent.mkdir(parents=True)
+    marker.touch()
+    scripts = folder / "lib" / "rhythmid_nodes"
+    scripts.mkdir(parents=True)
+    for name in ("plant", "excitation", "delay_injector", "recorder"):
+        (scripts / name).write_text(f'#!/bin/sh\nexec {sys.executable} -m rhythmid_nodes.{name} "$@"\n')
+        (scripts / name).chmod(0o755)
+    return folder
+
+
+@pytest.mark.timeout(LONG)
+@pytest.mark.skipif(importlib.util.find_spec("launch_ros") is None, reason="ROS's launch is not installed")
+def test_a_killed_plant_ends_a_real_launch_at_once_with_its_exit_code_and_a_valid_bag(
+    domain, no_shared_memory, tmp_path, monkeypatch
+):
+    monkeypatch.delenv("RHYTHMID_SUPERVISOR", raising=False)
+    path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"}, duration=60.0)
+    words = [f"experiment:={path}", f"bag:={tmp_path / 'bag'}"]
+    prefixes = os.pathsep.join(
+        filter(None, [str(prefix(tmp_path / "ros")), os.environ.get("AMENT_PREFIX_PATH")])
+    )
+    with (tmp_path / "said").open("w+") as said:
+        launched = subprocess.Popen(
+            [sys.executable, "-c", LAUNCH, str(BRINGUP / "launch" / "experiment.launch.py"), *words],
+            stdout=said, stderr=said, env={**os.environ, "AMENT_PREFIX_PATH": prefixes},
+        )  # fmt: skip
+        patience = time.monotonic() + 2 * PATIENCE
+        while "excitation starts" not in (text := (tmp_path / "said").read_text()):
+            assert launched.poll() is None and time.monotonic() < patience, text
+            time.sleep(0.1)
+        started = re.search(r"\[plant-\d+\]: process started with pid \[(\d+)\]", text)
+        assert started is not None
+        time.sleep(2.0)  # two chunks of the bag
+        os.kill(int(started[1]), signal.SIGKILL)
+        assert launched.wait(PATIENCE) == 128 + signal.SIGKILL
+    rows, _ = content(tmp_path / "bag")
+    assert rows["excitation"] and len(rows["joint_states"]) > 50
 
 
 def test_its_arguments_are_declared(launch_file):
