@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from fuzz import Watch, attempt, warm_up
 from fuzz_bags import OWN
+from fuzz_formats import robots
 from fuzz_targets import EXPERIMENT, TARGETS, Target
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,6 +22,7 @@ from refusals import refusal
 from scipy.io import savemat
 
 from rhythmid import document
+from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.errors import LONGEST_MESSAGE, InputError
 from rhythmid.experiment import Experiment
 from rhythmid.record import compression
@@ -326,3 +328,12 @@ def test_a_table_whose_name_no_file_can_have_is_refused_in_one_line(tmp_path):
     (tmp_path / "signals.yaml").write_text(text)
     with pytest.raises(InputError, match="is not a table"):
         read_record(tmp_path / "signals.yaml")
+
+
+# Robots
+
+
+@pytest.mark.parametrize("name", [b"upper", b"shoulder"])
+def test_a_robot_with_a_name_that_is_no_text_is_refused(tmp_path, name):
+    (tmp_path / "robot.urdf").write_bytes(robots()[0].replace(name, name + b"\xff"))
+    assert "is not UTF-8 text" in refusal(lambda: MujocoBody.load(tmp_path / "robot.urdf", contacts=False))

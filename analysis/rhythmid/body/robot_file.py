@@ -11,6 +11,7 @@ import xml.etree.ElementTree as tree
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +81,7 @@ def read_robot(
                 spec = mj.MjSpec.from_string(text)
             except (ValueError, mj.FatalError) as further:
                 raise _without_links(path) or refused(path, further) from None
+    _require_text(spec, path)
     if base == FIXED:
         floating = [one for one in spec.joints if one.type == mj.mjtJoint.mjJNT_FREE]
         for one in (*floating, *(spec.keys if floating else ())):  # key frames contain its positions, too
@@ -96,6 +98,21 @@ def read_robot(
     told.extend(_with_possible_inertias(spec))
     _hold(spec, hold or {}, path)
     return RobotFile(spec, (*told, *_held_fast(spec), *_coupled(spec)))
+
+
+def _require_text(spec: Any, path: Path) -> None:
+    """Raise InputError where a name, or the file of a mesh, is not UTF-8 text."""
+    named = (
+        spec.bodies, spec.joints, spec.geoms, spec.sites, spec.meshes, spec.actuators, spec.sensors, spec.tendons,
+        spec.equalities, spec.keys,
+    )  # fmt: skip
+    try:
+        for one in chain(*named):
+            str(one.name)
+        for mesh in spec.meshes:
+            str(mesh.file)
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: a name in it is not UTF-8 text; save the file as UTF-8") from None
 
 
 @contextmanager
