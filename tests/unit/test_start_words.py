@@ -9,8 +9,9 @@ from foreign import joint_state, moved, roles_of, servo, tones
 
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Recorded
-from rhythmid.start.meaning import force_unit_of, words_of
+from rhythmid.start.meaning import force_unit_of
 from rhythmid.start.start import guess, start
+from rhythmid.start.words import words_of
 
 TIME = np.arange(8000) * foreign.STEP
 FORCE, OTHER = tones(1, TIME), tones(9, TIME)
@@ -240,3 +241,30 @@ def test_a_column_called_an_input_in_another_language_drives(name: str, tmp_path
     columns = np.column_stack([time, drive, place])
     np.savetxt(path, columns, delimiter=",", header=f"t,{name},posicion", comments="", encoding="utf-8")
     assert guess(path).roles.choices["input"].recorded.said == name
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Sollmoment", "soll moment"), ("Drehzahlsollwert", "drehzahl sollwert"), ("Positionsistwert", "position istwert"),
+        ("Sollgelenkwinkel", "soll gelenk winkel"), ("Winkelgeschwindigkeit", "winkel geschwindigkeit"), ("Ankerstrom", "anker strom"),
+        ("Stellgröße", "stell grosse"), ("motorcurrent", "motor current"), ("cmdvel", "cmd vel"), ("tauref", "tau ref"), ("qdes", "q des"),
+        ("wheelspeed", "wheel speed"),
+    ],
+)  # fmt: skip
+def test_words_that_are_written_as_one_are_several(name, words):
+    assert words_of(name) == words.split()
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["test", "fact", "rectangle", "composition", "setpoint", "thetadot", "list", "moment", "recurrent"],
+)
+def test_a_word_that_only_ends_like_another_is_one(name):
+    assert words_of(name) == [name]
+
+
+def test_a_compound_says_who_asked_for_an_effort_and_which_one_was_measured(tmp_path):
+    path = table(tmp_path, Sollmoment=FORCE, Istmoment=FORCE + 0.1 * OTHER, Gelenkwinkel=X)
+    assert roles_of(path) == {"output": "Gelenkwinkel", "input": "Sollmoment", "effort": "Istmoment"}
+    assert "hold: zero" in guess(table(tmp_path, Sollmoment=FORCE, Gelenkwinkel=X)).signals

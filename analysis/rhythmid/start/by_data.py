@@ -12,7 +12,6 @@ from rhythmid.start.carried import surely_drives
 from rhythmid.start.copies import is_second_sensor
 from rhythmid.start.direction import COPY
 from rhythmid.start.meaning import (
-    Quantity,
     differ_in_number,
     is_counted,
     is_no_effort,
@@ -34,6 +33,7 @@ from rhythmid.start.relation import (
     predicts,
 )
 from rhythmid.start.role_choice import Choice, Known
+from rhythmid.start.vocabulary import Quantity
 
 OR_ELSE = "a base that moves is  kind: base_displacement, what a controller is asked for  kind: reference"
 NAMED = 8  # largest number of numbers in a note

@@ -3,9 +3,10 @@
 from dataclasses import replace
 
 from rhythmid.record.inventory import Recorded
-from rhythmid.start.meaning import names_a_place, words_of
+from rhythmid.start.meaning import names_a_place
 from rhythmid.start.relation import Follows, follows, predicts
 from rhythmid.start.role_choice import Choice, Known
+from rhythmid.start.words import words_of
 
 COPY = 0.9  # correlation with its command above which an answer is the same quantity
 LEAST_LAG = 2.5  # samples: two sensors of one motion may be that far apart because of filters and buses

@@ -7,9 +7,10 @@ from rhythmid.record.inventory import Recorded
 from rhythmid.record.signals import InputKind
 from rhythmid.start.direction import COPY, doubt_of_direction
 from rhythmid.start.force_unit import doubt_of_units, matching, of_one_unit
-from rhythmid.start.meaning import Quantity, meaning_of, says_base, says_it_was_read
+from rhythmid.start.meaning import meaning_of, says_base, says_it_was_read
 from rhythmid.start.relation import GOES_ALONG, HARDLY, coherent, follows
 from rhythmid.start.role_choice import Ask, Choice, Known, chosen, pick, ranked_by_worth, strongest
+from rhythmid.start.vocabulary import Quantity
 
 SAYS_READ = "its name says that it was read from a sensor"
 

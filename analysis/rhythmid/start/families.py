@@ -10,7 +10,9 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rhythmid.record.inventory import Inventory, Recorded
-from rhythmid.start.meaning import Meaning, Quantity, meaning_of, words_of
+from rhythmid.start.meaning import Meaning, meaning_of
+from rhythmid.start.vocabulary import Quantity
+from rhythmid.start.words import words_of
 
 GENERIC = frozenset({"joint"})  # words that a robot's file and its recordings add to joint names arbitrarily
 

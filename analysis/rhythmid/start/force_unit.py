@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 
 from rhythmid.record.inventory import Recorded
-from rhythmid.start.meaning import ELECTRICAL, driving_unit_of
+from rhythmid.start.meaning import driving_unit_of
 from rhythmid.start.role_choice import Known
+from rhythmid.start.vocabulary import ELECTRICAL
 
 MODELLED = (
     "effort",

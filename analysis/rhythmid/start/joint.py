@@ -8,7 +8,9 @@ import numpy as np
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Recorded
 from rhythmid.record.standstill import FLICKER
-from rhythmid.start.meaning import Meaning, Quantity, joint_of_column, same_joint, words_of
+from rhythmid.start.meaning import Meaning, joint_of_column, same_joint
+from rhythmid.start.vocabulary import Quantity
+from rhythmid.start.words import words_of
 
 CLOSE_MOTION = 0.7  # ratio to the largest motion of a joint above which the user is asked about another joint
 

@@ -12,7 +12,7 @@ from rhythmid.start.by_data import output_by_data
 from rhythmid.start.carried import Carried, carried_motion
 from rhythmid.start.direction import by_direction
 from rhythmid.start.joint import Joint, joint_of, shows_motion
-from rhythmid.start.meaning import Quantity, doubt_of_letter, is_ignored, meaning_of, says_who_asks
+from rhythmid.start.meaning import doubt_of_letter, is_ignored, meaning_of, says_who_asks
 from rhythmid.start.poses import with_joint_positions
 from rhythmid.start.relation import runs_like_a_clock
 from rhythmid.start.role_choice import Ask, Choice, Known, pick, ranked_by_worth
@@ -21,6 +21,7 @@ from rhythmid.start.step_before import gone_to_set_point
 from rhythmid.start.symbols import with_symbols
 from rhythmid.start.targets import with_targets
 from rhythmid.start.unnamed_joints import column_groups
+from rhythmid.start.vocabulary import Quantity
 from rhythmid.start.written_twice import written_once
 
 MEASURED: tuple[Quantity, ...] = ("position", "velocity", "acceleration")

@@ -6,17 +6,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from rhythmid.record.inventory import Inventory, Recorded
-from rhythmid.start.meaning import (
-    COMMANDED,
-    CONTROLLED_SHORT,
-    LETTERS,
-    PLACES,
-    WORDS,
-    Quantity,
-    is_word,
-    joint_of_column,
-    words_of,
-)
+from rhythmid.start.meaning import is_word, joint_of_column
+from rhythmid.start.vocabulary import COMMANDED, CONTROLLED_SHORT, LETTERS, PLACES, WORDS, Quantity
+from rhythmid.start.words import words_of
 
 NAMING: tuple[Quantity, ...] = (
     "position",

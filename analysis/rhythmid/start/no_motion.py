@@ -4,8 +4,8 @@ import json
 from collections.abc import Sequence
 
 from rhythmid.errors import InputError
-from rhythmid.start.meaning import words_of
 from rhythmid.start.role_choice import Known
+from rhythmid.start.words import words_of
 
 LISTED = 12  # largest number of numbers in the message
 AMBIGUOUS = frozenset(

@@ -24,10 +24,12 @@ from rhythmid.start.drivers import not_read
 from rhythmid.start.families import GENERIC, Family, families_of, joints_of, with_constants
 from rhythmid.start.first_gains import first_gains
 from rhythmid.start.leading_family import leading_family
-from rhythmid.start.meaning import ELECTRICAL, WORDS, Quantity, says_it_was_read, words_of
+from rhythmid.start.meaning import says_it_was_read
 from rhythmid.start.passive_joints import base_channel, base_of, unused, without_passive
 from rhythmid.start.unnamed_families import HOW, unnamed_families, without_names
 from rhythmid.start.unsigned_effort import unsigned_family
+from rhythmid.start.vocabulary import ELECTRICAL, WORDS, Quantity
+from rhythmid.start.words import words_of
 from rhythmid.start.yaml_text import GUESSED, as_guessed, comment, time_of
 
 # words that name a current, and those that name a force, also one that was computed from a current

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from rhythmid.record.inventory import Recorded
-from rhythmid.start.meaning import Meaning, Quantity
+from rhythmid.start.meaning import Meaning
+from rhythmid.start.vocabulary import Quantity
 
 Ask = Callable[
     [str, Sequence[str]], int

@@ -12,11 +12,7 @@ from rhythmid.start.copies import copies_output, note_of_copy, note_of_sensor
 from rhythmid.start.direction import notes_of_other_joints
 from rhythmid.start.drivers import drivers
 from rhythmid.start.joint import Joint
-from rhythmid.start.meaning import (
-    Quantity,
-    is_lone_v,
-    meaning_of,
-)
+from rhythmid.start.meaning import is_lone_v, meaning_of
 from rhythmid.start.measured_motion import Motion, measured_motion, numbers
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
 from rhythmid.start.role_choice import Ask, Choice, Known
@@ -25,6 +21,7 @@ from rhythmid.start.stated import DRIVES
 from rhythmid.start.step_before import BEFORE, duty_before, set_point_before, step_before
 from rhythmid.start.unnamed_reference import with_reference
 from rhythmid.start.unsigned_effort import without_unsigned
+from rhythmid.start.vocabulary import Quantity
 
 INTEGRAL = 0.9  # correlation above which a position and a velocity belong together
 PER_MINUTE = 0.02  # by which a ratio of one to sixty may be off: that of degrees is 5 % off

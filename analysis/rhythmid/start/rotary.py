@@ -1,7 +1,9 @@
 """Whether a recorded quantity is rotational or translational, by its unit, its type and the words of its name."""
 
 from rhythmid.record.inventory import Recorded
-from rhythmid.start.meaning import ELECTRICAL, force_unit_of, meaning_of, words_of
+from rhythmid.start.meaning import force_unit_of, meaning_of
+from rhythmid.start.vocabulary import ELECTRICAL
+from rhythmid.start.words import words_of
 
 ROTARY = frozenset(
     "angle angles angular theta phi alpha torque torques tor torq tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from rhythmid.record.inventory import Inventory, Recorded
-from rhythmid.start.meaning import is_word, words_of
+from rhythmid.start.meaning import is_word
+from rhythmid.start.words import words_of
 
 OTHER = {"l": "r", "r": "l", "left": "right", "right": "left"}
 SIDES = {

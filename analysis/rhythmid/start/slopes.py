@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rhythmid.start.meaning import words_of
 from rhythmid.start.relation import RATIO, SURE_INTEGRAL, derivative
 from rhythmid.start.role_choice import Known
+from rhythmid.start.words import words_of
 
 
 def without_slopes(known: Sequence[Known]) -> list[Known]:

@@ -7,7 +7,7 @@ from typing import cast, get_args
 from rhythmid.errors import InputError
 from rhythmid.record.heading import unit_of
 from rhythmid.record.inventory import Inventory, Recorded, StatedRole
-from rhythmid.start.meaning import BY_UNIT
+from rhythmid.start.vocabulary import BY_UNIT
 
 ROLES: tuple[StatedRole, ...] = get_args(StatedRole)
 DRIVES: frozenset[StatedRole] = frozenset(("input", "reference", "base", "forcing"))

@@ -6,7 +6,8 @@ import numpy as np
 
 from rhythmid.record.inventory import Recorded
 from rhythmid.start.joint import Joint
-from rhythmid.start.meaning import Quantity, force_unit_of, meaning_of
+from rhythmid.start.meaning import force_unit_of, meaning_of
+from rhythmid.start.vocabulary import Quantity
 
 BEFORE = "it never changes: taken for a step that was made as the record began; without it, delete this input"
 # largest rms distance from the set point afterwards, as a share of the initial distance, for an output that goes there

@@ -4,8 +4,8 @@ import re
 from collections.abc import Sequence
 
 from rhythmid.record.inventory import Recorded
-from rhythmid.start.meaning import Quantity
 from rhythmid.start.role_choice import Known
+from rhythmid.start.vocabulary import Quantity
 
 SYMBOL = re.compile(r"([VUIWTF])_?([a-z]?\d?)")
 OF: dict[str, Quantity] = {

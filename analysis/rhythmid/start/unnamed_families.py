@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from rhythmid.record.inventory import Inventory, Recorded
 from rhythmid.start.direction import COPY
 from rhythmid.start.families import Family
-from rhythmid.start.meaning import Meaning, Quantity
+from rhythmid.start.meaning import Meaning
 from rhythmid.start.relation import follows
 from rhythmid.start.unnamed_joints import column_groups
+from rhythmid.start.vocabulary import Quantity
 
 HOW = (
     "its columns have no names; without names, joints are recognised only if the columns stand in groups of one column for each joint, the "

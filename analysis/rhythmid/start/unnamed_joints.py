@@ -5,9 +5,9 @@ from collections import defaultdict
 from dataclasses import dataclass, replace
 
 from rhythmid.record.inventory import Inventory
-from rhythmid.start.meaning import Quantity
 from rhythmid.start.relation import integrals
 from rhythmid.start.role_choice import Known
+from rhythmid.start.vocabulary import Quantity
 
 # least number of joints whose velocities follow their positions at the same distance, for columns to form groups
 FEWEST_JOINTS = 2
