@@ -10,17 +10,18 @@ from rhythmid.record.inventory import inventory
 
 
 @given(
-    st.integers(1, 3000), st.sampled_from([(16, 1.0), (32, 1.0), (32, 1e-3), (32, 1e-6)]), st.integers(10, 900),
+    st.integers(1, 3000), st.sampled_from([(16, 1.0), (24, 1.0), (32, 1.0), (32, 1e-3), (32, 1e-6)]), st.integers(10, 900),
     st.lists(st.integers(1, 9), min_size=30, max_size=60),
 )  # fmt: skip
-def test_a_counter_of_16_or_32_bits_goes_on_over_its_end(usual, counter, before, lost):
+def test_a_counter_of_16_24_or_32_bits_goes_on_over_its_end(usual, counter, before, lost):
     bits, unit = counter
     steps = np.full(2 * len(lost), usual)
     steps[1::2] *= np.array(lost) > 8  # two samples with one stamp
     steps[::7] *= 2  # a lost sample
     true = 2**bits - min(before, len(lost)) * usual + np.cumsum(steps)
     counted = true % 2**bits
-    found = unwrapped(counted * unit)
+    found, said = unwrapped(counted * unit)
+    assert said is not None and f"{bits} bits" in said
     np.testing.assert_allclose(np.diff(found), np.diff(true) * unit, atol=1e-6 * unit * 2**bits / 1e3)
 
 
@@ -33,7 +34,18 @@ def test_a_counter_of_16_or_32_bits_goes_on_over_its_end(usual, counter, before,
     ],
 )  # fmt: skip
 def test_what_is_no_counter_at_its_end_is_left_as_it_is(values):
-    assert unwrapped(values) is values
+    assert unwrapped(values)[0] is values and unwrapped(values)[1] is None
+
+
+def test_a_counter_with_a_sign_and_one_of_which_rows_are_lost_at_its_end_go_on():
+    true = 2.0**31 - 50_000.0 + 5_000.0 * np.arange(60)
+    found, said = unwrapped((true + 2.0**31) % 2.0**32 - 2.0**31)
+    np.testing.assert_array_equal(np.diff(found), 5_000.0)
+    assert said is not None and said.startswith("begins anew once")
+    kept = np.r_[0:8, 40:60]
+    np.testing.assert_array_equal(
+        np.diff(unwrapped(true[kept] * 2.0 % 2.0**32)[0]), 2.0 * np.diff(true[kept])
+    )
 
 
 def test_a_log_of_micros_over_its_end_is_one_record(tmp_path):

@@ -160,7 +160,7 @@ def test_a_line_that_is_no_row_is_refused_with_its_number_and_what_to_do(tmp_pat
 
 
 def test_a_time_that_begins_anew_often_is_refused_with_what_takes_it_apart(tmp_path):
-    with pytest.raises(InputError, match=r"'t' begins anew or goes back; .* rhythmid split"):
+    with pytest.raises(InputError, match=r"'t' begins anew or goes back, first in row 31; .* rhythmid split"):
         inventory(write(tmp_path, ROWS[:30] * 6))
 
 

@@ -97,9 +97,24 @@ def test_a_clock_that_was_set_back_is_refused(back):
     time = np.arange(300) * 1e-3 + 2e9
     time[100:] -= back
     with pytest.raises(
-        InputError, match=r"^output: time goes backwards by .* \(sample 100 of 300\).*; split it$"
+        InputError,
+        match=r"^output: time goes backwards by .* \(sample 101 of 300\): the clock was set back there, .*; split it$",
     ):
         put_in_order(time, "output", "split it")
+
+
+def test_rows_that_are_mixed_up_are_refused_with_another_mend_than_a_clock_that_was_set_back():
+    order = np.random.default_rng(0).permutation(300)
+    with pytest.raises(
+        InputError, match=r"the first of \d+ times\): rows are mixed up or damaged: sort them"
+    ):
+        put_in_order(np.arange(300)[order] * 1e-3, "output", "split it")
+
+
+def test_gaps_that_channels_share_are_counted_once():
+    quality = ChannelQuality("/y", Timing.of(np.delete(np.arange(100), [50, 70, 71]) * 1e-3))
+    both = Quality({"input": quality, "output": quality})
+    assert (both.gaps, both.lost, both.to_dict()["gaps"]) == (2, 3, 2)
 
 
 @given(seed=seeds, limit=st.floats(0.3, 0.9))
@@ -159,7 +174,7 @@ def test_every_flaw_is_named():
     time = np.sort(np.concatenate([np.delete(np.arange(100), [50, 51]), [7]])) * 1e-3
     flawed = ChannelQuality("/y", Timing.of(time), nan=1, clipped=4, missing=2, conflicts=1)
     told = "; ".join(flawed.complaints())
-    for words in ("1 gaps, 2 samples lost, longest 0.003 s", "1 duplicates, 1 of them", "1 samples are NaN or empty",
+    for words in ("1 gaps, 2 samples lost, longest 0.003 s", "1 duplicates, 1 of them with other values: of equal times the first sample is kept", "1 samples are NaN or empty",
                   "4 samples look clipped", "2 messages without"):  # fmt: skip
         assert words in told
     quality = Quality({"output": flawed}, truncated=True, notes=("breaks off",))

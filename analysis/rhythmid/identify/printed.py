@@ -41,7 +41,7 @@ def show(result: Mapping[str, Any], console: Console) -> None:
     quality = result["quality"]
     of = averaged_words(quality.get("averaged", 1))
     console.print(
-        f"{quality['rate']:.6g} Hz, {quality['gaps']} gaps, free-run NRMSE {quality['nrmse']:.5f}{of}"
+        f"{quality['rate']:.6g} Hz, {quality['gaps']} gaps of the output, free-run NRMSE {quality['nrmse']:.5f}{of}"
     )
     _show_held_out(result.get("held_out"), console)
     for note in result["notes"]:

@@ -85,8 +85,8 @@ class ChannelQuality:
         timing = self.timing
         found = {
             f"{timing.gaps} gaps, {timing.lost} samples lost, longest {timing.longest_gap:.4g} s": timing.gaps,
-            f"{timing.duplicates} duplicates, {self.conflicts} of them with other values": timing.duplicates,
-            f"{timing.late} messages out of order": timing.late,
+            f"{timing.duplicates} duplicates, {self.conflicts} of them with other values: of equal times the first sample is kept": timing.duplicates,
+            f"{timing.late} samples out of order, sorted by their times": timing.late,
             f"{self.nan} samples are NaN or empty and count as missing": self.nan,
             f"{self.placeholders} samples hold {self.placeholder} for nothing measured and count as missing": self.placeholders,
             f"{self.clipped} samples look clipped": self.clipped,
@@ -126,18 +126,18 @@ class Quality:
 
     @property
     def gaps(self) -> int:
-        """Gaps in all channels."""
-        return sum(channel.timing.gaps for channel in self.channels.values())
+        """Gaps of the output. Channels of one table share their gaps, which must not be counted for each."""
+        return self.channels["output"].timing.gaps
 
     @property
     def lost(self) -> int:
-        """Samples lost in all channels."""
-        return sum(channel.timing.lost for channel in self.channels.values())
+        """Samples of the output that were lost."""
+        return self.channels["output"].timing.lost
 
     @property
     def duplicates(self) -> int:
-        """Duplicates dropped in all channels."""
-        return sum(channel.timing.duplicates for channel in self.channels.values())
+        """Duplicates of the output, which were dropped."""
+        return self.channels["output"].timing.duplicates
 
     @property
     def clipped(self) -> int:

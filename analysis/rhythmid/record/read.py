@@ -36,7 +36,9 @@ from rhythmid.record.unit_notes import unit_notes
 MOSTLY = 0.5  # share of samples that are not numbers above which a channel is unusable
 LARGEST = 1e100  # largest measured value: its square is still finite
 AMBIGUOUS = 0.01  # share of samples that may have the same time as another one with a different value
-SPLIT = "sort the table, or take it apart with  rhythmid split"
+SPLIT = "take what lies before and after apart with  rhythmid split {table} --out runs"
+USE_RECEIPT = "use  time: receive"
+USE_STAMPS = "use  time: header  where the messages have stamps; else record what lies before and after in bags of their own"
 SAMPLES_PER_CYCLE = 100  # of a forcing that is given by a formula
 MOST_OF_FORMULA = 50_000_000  # samples of it, 400 MB: an hour at 100 Hz has 36 million
 
@@ -134,7 +136,7 @@ def read_bag(bag: Bag, signals: Signals | None = None, opened: Opened | None = N
     first = min(int(stamp_ns.min()) for _, stamp_ns, _ in samples)
     start_ns = first if origin_of(first * 1e-9) else 0
     made = {role: replace(part, time=(stamp_ns - start_ns) * 1e-9) for role, stamp_ns, part in samples}
-    mend = "use  time: receive" if chosen.time.kind == "header" else "split the recording there"
+    mend = USE_RECEIPT if chosen.time.kind == "header" else USE_STAMPS
     quality = Quality({}, bag.truncated, (*bag.notes, *notes, *punctuality_notes(description)))
     record = _record(bag.name, made, chosen, mend, quality)
     return _finish(replace(record, start_ns=start_ns, hold=chosen.hold or "zero", run=description), chosen)
@@ -187,7 +189,7 @@ def read_tables(signals: Signals, opened: Opened | None = None) -> Record:
     calendar = first >= CALENDAR
     if calendar:  # the used part starts with its first row
         made = {role: replace(samples, time=samples.time - first) for role, samples in made.items()}
-    record = _record(name, made, signals, SPLIT, quality)
+    record = _record(name, made, signals, SPLIT.format(table=" ".join(map(str, tables))), quality)
     record = replace(record, hold=signals.hold) if signals.hold else with_hold(record)
     record = _finish(replace(record, one_clock=len(clocks) == 1), signals, first if calendar else 0.0)
     return record if calendar else counted_from(record, origin_of(first))

@@ -104,7 +104,9 @@ class Table:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
         except Exception as error:  # the readers may raise any exception on damaged .mat and .npz files
             raise InputError(f"{path}: cannot be read as a table: {' '.join(str(error).split())}") from None
-        times = {name: unwrapped(one) for name, one in columns.items() if is_called_time(name)}
+        continued = {name: unwrapped(one) for name, one in columns.items() if is_called_time(name)}
+        notes = (*notes, *(f"{path.name}: {name!r} {said}" for name, (_, said) in continued.items() if said))
+        times = {name: one for name, (one, _) in continued.items()}
         others = {name: _upright(one) for name, one in columns.items() if name not in times}
         told, placeholders = without_placeholders(others)
         return cls(path, {name: {**times, **told}[name] for name in columns}, notes, placeholders)

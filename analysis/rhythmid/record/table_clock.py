@@ -13,6 +13,7 @@ from rhythmid.record.clock_time import DAY
 from rhythmid.record.heading import heading_of
 from rhythmid.record.record import FEWEST_COMMON_SAMPLES
 from rhythmid.record.signals import Clock
+from rhythmid.record.timing import SHORTEST_RUN
 
 Array = NDArray[np.float64]
 TIME = re.compile(
@@ -37,8 +38,6 @@ SERIAL_DAYS = (36526.0, 73051.0)
 DATED = (946684800.0, 4102444800.0)  # seconds since 1970 of the same years
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))  # in which times are written
 NANOSECOND = 1e-9  # [s] smallest unit in which times are written
-# rows of a run from which on a column that begins anew holds several; fewer are the rest of a buffer (`stale_rows`)
-SHORTEST_RUN = 20
 MOSTLY_FORWARD = 0.9  # the same for a time that restarts with each of several recordings
 
 
@@ -177,8 +176,9 @@ def table_clock(
         names += f" and {len(columns) - MOST_NAMED} more"
     others = ", ".join(f"{name} has {len(value)} rows" for name, value in unequal)
     if anew := [name for name, value in columns if _is_plain_time(name) and _begins_anew(value)]:
+        row = 2 + int(np.argmax(np.diff(dict(columns)[anew[0]]) < 0.0))
         raise InputError(
-            f"{path}: {anew[0]!r} begins anew or goes back; take the recordings apart with  rhythmid split {path} --out runs"
+            f"{path}: {anew[0]!r} begins anew or goes back, first in row {row}; take the recordings apart with  rhythmid split {path} --out runs"
         )
     if len(columns[0][1]) < FEWEST_COMMON_SAMPLES:
         raise InputError(

@@ -29,6 +29,8 @@ PARTS = 8
 FULL = 0.5  # least delay of the earliest sample after a gap, as a share of the missing periods
 # largest number of long steps used to detect irregular stamps: more steps take time without changing the result
 JUDGED = 500
+# samples from which on what follows a step back is a run of its own and no mixed-up rows
+SHORTEST_RUN = 20
 AT_AN_END = 0.95  # the same near an end, where so few samples remain that all may be late because of jitter
 
 Times = NDArray[np.float64]
@@ -237,8 +239,8 @@ def put_in_order(time: Times, label: str, mend: str) -> NDArray[np.int64]:
 
     Messages may overtake one another on their way to the recorder. Such a message is sorted into place if it is at
     most 10 periods late and fills a hole, so that no two samples are closer than half a period. Jittering stamps
-    may occasionally be exchanged with their neighbours. Any other step backwards means that the clock was set back;
-    then the recording is rejected.
+    may occasionally be exchanged with their neighbours. After any other step backwards the times do not show when a
+    sample was taken: a clock was set back, another recording begins, or the rows are mixed up. Then the recording is rejected.
 
     Raises InputError, beginning with `label` and ending with `mend`, when time goes backwards or stands still.
     """
@@ -258,9 +260,23 @@ def put_in_order(time: Times, label: str, mend: str) -> NDArray[np.int64]:
     near = np.concatenate([step[moved[moved > 0] - 1], step[moved[moved < len(step)]]])
     fills = len(moved) == len(late) and (near >= 0.5 * period).all()
     if not fills or (newest[late] - time[late]).max() > LATE * period:
-        first = late[0]
-        raise InputError(
-            f"{label}: time goes backwards by {newest[first] - time[first]:.6g} s at {newest[first]:.6f} s "
-            f"(sample {first} of {len(time)}): the clock was set back, or that row is damaged; {mend}"
-        )
+        raise InputError(f"{label}: time goes backwards {_backwards(time)}; {mend}")
     return kept
+
+
+def _backwards(time: Times) -> str:
+    """Where the times (n,) step back, how often, and what that means: runs of rows between such steps are recordings or parts
+    of one, single rows are mixed up or damaged."""
+    back = 1 + np.flatnonzero(np.diff(time) < 0.0)
+    first = int(back[0])
+    often = "" if len(back) == 1 else f", the first of {len(back)} times"
+    runs = np.diff(np.concatenate([[0], back, [len(time)]]))
+    what = (
+        "the clock was set back there, or another recording begins"
+        if runs.min() >= SHORTEST_RUN
+        else "rows are mixed up or damaged: sort them by their time, or delete them, unless the clock was set back"
+    )
+    return (
+        f"by {time[first - 1] - time[first]:.6g} s at {time[first - 1]:.6f} s "
+        f"(sample {first + 1} of {len(time)}{often}): {what}"
+    )

@@ -59,7 +59,7 @@ def quality_section(records: Sequence[RecordQuality]) -> Section:
                 _count(one.clipped, " samples"),
             )
         )  # fmt: skip
-    columns = ("record", "used for", "channels", "length", "jitter (std)", "gaps", "clipped")
+    columns = ("record", "used for", "channels", "length", "jitter (std)", "gaps of the output", "clipped")
     warnings = tuple(f"{one.name}: {line}" for one in records for line in one.warnings)
     remarks: Block = Bullets(warnings) if warnings else Paragraph("No remarks.", "note")
     return Section(
