@@ -4,20 +4,30 @@
 
 The recording (docs/real.md) is in $RHYTHMID_DATA, else in ../shared/data beside the checkout. Printed: the error of free runs over
 the held-out last fifth of the recording, as a share of the motion of each leg, of the file as it is and as identified; the
-rotors' inertias of left and right legs; what the data do not separate; and with --diagnose what is missing at which joint. `--folder`
+rotors' inertias of left and right legs, also of each half and of the whole of the recording; what the data do not separate; and with --diagnose what is missing at which joint. `--folder`
 keeps the files that were made.
 """
 
 import argparse
 import os
 import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.identify.joints.joint_identification import MachineIdentification, identify_machine
-from rhythmid.record.joint_record import load_joint_records
+from rhythmid.identify.joints.held_reference import balances_of
+from rhythmid.identify.joints.joint_identification import (
+    MachineIdentification,
+    identify_machine,
+    rotor_freed,
+)
+from rhythmid.identify.joints.reference_delay import fit_with_delay, reference_delay
+from rhythmid.model import INERTIA
+from rhythmid.record.cleaning import cleaned_joints
+from rhythmid.record.joint_record import JointRecord, load_joint_records
 
 LEGS = ("FL", "FR", "RL", "RR")
 PARTS = ("hip", "thigh", "calf")
@@ -68,6 +78,29 @@ def told(name: str, found: MachineIdentification) -> None:
         print(f"not separable: {line}")
 
 
+def rotors(records: Sequence[JointRecord], machine: Machine) -> dict[str, str]:
+    """The rotors' inertias of these records by inverse dynamics, with their standard deviations, by the part of a leg; and the delay."""
+    records, _ = cleaned_joints(records, machine.turning)
+    balances = balances_of(machine, records)
+    known = machine.body.parameters
+    balances = replace(
+        balances,
+        models={
+            joint: rotor_freed(one, known[f"{joint}.armature"]) for joint, one in balances.models.items()
+        },
+    )
+    common = reference_delay(balances, balances.computed)
+    made: dict[str, list[str]] = {part: [] for part in PARTS}
+    for joint in machine.joints:
+        fit = fit_with_delay(
+            balances.balance(joint, common.shared.value), balances.models[joint], joint, common
+        )
+        value = known[f"{joint}.armature"] + fit.model.mass.value - machine.paths[joint].mass.value
+        std = fit.std[1 + fit.names.index(INERTIA)]
+        made[joint.split("_")[1]].append(f"{value:.4f} ± {std:.4f}")
+    return {part: ", ".join(values) for part, values in made.items()} | {"delay": common.told}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path)
@@ -86,6 +119,14 @@ def main() -> None:
     found = identify_machine(records, machine)
     told("with a constant torque at each joint", found)
     found.machine.save(folder / "identified.yaml")
+    start, end = records[0].span
+    for first, last in ((0.0, 0.5), (0.5, 1.0), (0.0, 1.0)):
+        part = records[0].cut(start + first * (end - start), start + last * (end - start))
+        print(
+            f"== from {first:g} to {last:g} of the record, with a constant torque at each joint, by inverse dynamics alone"
+        )
+        for name, values in rotors([part], machine).items():
+            print(f"{name}: {values}")
     if given.diagnose:
         answer = diagnose_machine(records, Machine.load(model)).diagnosis
         print(answer.summary)

@@ -9,8 +9,9 @@ from legged import MODELS, fixed_leg, recorded, references
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
 from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.identify.inverse_dynamics.estimate import ROUGH
 from rhythmid.identify.joints.joint_motion import JointBalances
-from rhythmid.identify.joints.reference_delay import Delay, reference_delay, shared
+from rhythmid.identify.joints.reference_delay import Delay, fit_with_delay, reference_delay, shared
 from rhythmid.record.joint_record import JointRecord
 
 TIME = np.arange(0.0, 6.0, 0.002)
@@ -64,6 +65,33 @@ def test_a_joint_with_another_delay_is_told_from_the_shared_one():
 def test_of_two_joints_that_differ_the_earlier_one_has_the_shared_delay():
     found = shared({"hip": Delay(0.009, 1e-5), "knee": Delay(0.001, 1e-4)}, SAMPLE)
     assert found.agree == ("knee",) and not found.equal
+
+
+@pytest.mark.parametrize(("apart", "equal"), [(0.4, True), (3.0, False)])
+def test_a_missing_effect_may_shift_the_delay_of_joints_that_share_one_by_a_part_of_a_sample(
+    apart: float, equal: bool
+):
+    delays = {
+        f"joint{n}": Delay(0.004 + shift * apart * SAMPLE, 1e-5) for n, shift in enumerate((-1, 0, 1, 0))
+    }
+    assert shared(delays, SAMPLE).equal is equal
+
+
+def test_joints_that_share_a_delay_have_it_and_its_uncertainty_in_their_fits():
+    machine = Machine.load(MODELS / "arm.yaml")
+    plant = machine.with_element(
+        "joint3", load_catalogue()["coulomb_friction"], {"force": FRICTION, "transition": 0.02}
+    )
+    record = asked_of(plant, delays=dict.fromkeys(machine.joints, 0.0063))
+    balances = JointBalances.of(machine, [record])
+    common = reference_delay(balances, balances.computed)
+    assert common.equal
+    for joint in machine.joints:
+        fit = fit_with_delay(
+            balances.balance(joint, common.shared.value), balances.models[joint], joint, common
+        )
+        assert abs(fit.alignment) < 3.0 * ROUGH * SAMPLE
+        assert 0.0 < fit.std[0] <= common.shared.std
 
 
 def test_a_reference_that_is_late_at_one_joint_is_named_there_as_a_delay_of_its_command(tmp_path):

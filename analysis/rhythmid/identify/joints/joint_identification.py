@@ -18,13 +18,7 @@ from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import (
-    FARTHEST,
-    Alignment,
-    EffortFit,
-    fit_effort,
-    size_of,
-)
+from rhythmid.identify.inverse_dynamics.estimate import EffortFit, size_of
 from rhythmid.identify.joint import POOR_MOTION
 from rhythmid.identify.joints.adopted_inertia import adopted_inertia
 from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_inertia
@@ -34,7 +28,7 @@ from rhythmid.identify.joints.held_reference import balances_of, not_told
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_plausibility import check_joints
 from rhythmid.identify.joints.output_error import Knowledge, free_runs, refine
-from rhythmid.identify.joints.reference_delay import ReferenceDelay, reference_delay
+from rhythmid.identify.joints.reference_delay import ReferenceDelay, fit_with_delay, reference_delay
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
@@ -214,7 +208,7 @@ def identify_machine(
     for joint in machine.joints:
         tell(f"joint {joint}")
         balance = balances.balance(joint, lates.get(joint, 0.0))
-        fit = fit_effort(balance, balances.models[joint], aligned=_aligned(balance, joint, common))
+        fit = fit_with_delay(balance, balances.models[joint], joint, common)
         fits[joint] = balance, fit
     inertia = better = None
     if not balances.computed:
@@ -348,24 +342,6 @@ def _with_fit(
         machine = machine.with_values({delay: whole})
         found[delay] = JointEstimate(whole, float(fit.std[0]), "s")
     return machine
-
-
-def _aligned(balance: Balance, joint: str, common: ReferenceDelay | None) -> Alignment | None:
-    """Prior of the delay of a joint's reference, relative to the shared delay; None where its effort was recorded.
-
-    Its standard deviation is that of the shared delay where all joints agree. If only some agree, it is one sample
-    for these, as for timestamps. For a joint with another delay, the prior is about its own delay and at least one
-    sample wide.
-    """
-    if common is None or joint not in common.joints:
-        return None
-    own, most = common.joints[joint], FARTHEST * balance.period
-    if common.equal:
-        return Alignment(common.shared.std, -most, most)
-    if joint in common.agree:
-        return Alignment.of(balance)
-    apart = own.value - common.shared.value
-    return Alignment(max(own.std, balance.period), apart - most, apart + most, apart)
 
 
 def _known(machine: Machine, found: dict[str, JointEstimate]) -> dict[str, Knowledge]:

@@ -27,8 +27,8 @@ from rhythmid.statistics import NORMAL_95
 Array = NDArray[np.float64]
 LONGEST_REFERENCE_DELAY = 0.1  # [s] largest delay of a reference
 FIRST = 3  # Gauss-Newton steps of the fit before the scan of delays: the parameters are nearly linear
-# share of a sample: standard deviation within which joints count as agreeing, as a missing effect may shift the
-# phase of one
+# share of a sample: standard deviation by which a missing effect may shift the delay of a joint, where joints are
+# said to agree or to differ
 AGREES = 0.5
 EQUAL = 0.01  # probability of such a scatter of equal delays below which not all joints share one delay
 
@@ -50,7 +50,8 @@ class Delay:
 class ReferenceDelay:
     """Delay [s] of references beyond the model's delays: of each joint, and the shared one of those that `agree`.
 
-    `chance` is the probability of delays as unequal as these if all joints have the same delay; None for one joint.
+    `chance` is the probability of delays as unequal as these if all joints have the same delay, which a missing effect may
+    shift at each of them; None for one joint.
     """
 
     shared: Delay
@@ -118,6 +119,28 @@ def delay_fit(balance: Balance, balances: JointBalances, joint: str) -> EffortFi
     return replace(best, std=np.append(best.std[0] * math.sqrt(free.correlation), best.std[1:]))
 
 
+def fit_with_delay(balance: Balance, model: Model, joint: str, common: ReferenceDelay | None) -> EffortFit:
+    """The fit of a joint's path, in which its reference has the delay of `common` where it was not recorded as an effort.
+
+    If all joints have one delay, this joint has it to the jitter of timestamps; its standard deviation enters those of the
+    values. If only some agree, these have it to a sample, as for timestamps. For a joint with another delay, the prior is
+    about its own delay and at least one sample wide.
+    """
+    if common is None or joint not in common.joints:
+        return fit_effort(balance, model)
+    own, most = common.joints[joint], FARTHEST * balance.period
+    if common.equal:
+        fit = fit_effort(balance, model, aligned=Alignment(ROUGH * balance.period, -most, most))
+        uncertain = Alignment(common.shared.std, -most, most)
+        wide = fit_effort(balance, fit.model, aligned=uncertain, alignment=fit.alignment, steps=0)
+        return replace(fit, std=wide.std)
+    if joint in common.agree:
+        return fit_effort(balance, model, aligned=Alignment.of(balance))
+    apart = own.value - common.shared.value
+    std = max(own.std, balance.period)
+    return fit_effort(balance, model, aligned=Alignment(std, apart - most, apart + most, apart))
+
+
 def _scanned(balance: Balance, model: Model, wide: Alignment) -> float:
     """The delay [s] within these limits with the least error of the path fitted without one. Raises InputError where nothing can be fitted."""
     first = fit_effort(balance, model, steps=FIRST)
@@ -155,7 +178,8 @@ def shared(joints: dict[str, Delay], period: float) -> ReferenceDelay:
     )  # widened to their scatter (R. T. Birge, Phys. Rev. 40 (1932) 207)
     chance = None
     if len(names) > 1:
-        mean = float(weights @ values / weights.sum())
-        chance = float(chi2.sf(float(weights @ (values - mean) ** 2), len(names) - 1))
+        alike = 1.0 / (variances + (AGREES * period) ** 2)
+        mean = float(alike @ values / alike.sum())
+        chance = float(chi2.sf(float(alike @ (values - mean) ** 2), len(names) - 1))
     agree = tuple(name for name, one in zip(names, some, strict=True) if one)
     return ReferenceDelay(Delay(middle, float(std)), dict(joints), agree, chance)
