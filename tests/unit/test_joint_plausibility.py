@@ -90,6 +90,23 @@ def test_of_an_arms_six_joints_the_order_is_found():
     assert said is not None and "joint2 is recorded as joint5, joint3 is recorded as joint2" in said
 
 
+@pytest.mark.parametrize(("role", "said"), [("output", "positions"), ("effort", "efforts")])
+def test_an_order_that_is_wrong_in_one_channel_alone_is_told_with_the_channel(role: str, said: str):
+    machine, record = arm()
+    one, other = record.joints["joint2"], record.joints["joint3"]
+    joints = {
+        "joint2": replace(one, **{role: getattr(other, role)}),
+        "joint3": replace(other, **{role: getattr(one, role)}),
+    }
+    found = likely_joint_mend(machine, [replace(record, joints=record.joints | joints)])
+    assert found is not None and "\n" not in found
+    assert (
+        f"the {said} alone seem to be recorded in another order: joint2 is recorded as joint3, joint3 is recorded as joint2"
+        in found
+    )
+    assert f"in the order of 'joints:' under '{role}:' in signals.yaml" in found
+
+
 @pytest.mark.parametrize(
     ("position", "effort", "joints", "said"),
     [

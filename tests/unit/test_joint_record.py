@@ -134,6 +134,10 @@ def test_a_list_has_the_column_of_each_joint_and_a_star_in_a_unit_is_no_joint(tm
     assert found.joints["knee"].channels["effort"].unit == "N*m"
     with pytest.raises(InputError, match="lists 1 columns of 2 joints; give each joint one"):
         JointSignals.from_text(text.replace("[2, 1]", "[2]"))
+    with pytest.raises(
+        InputError, match="lists 2 for more than one joint; give each joint a column of its own"
+    ):
+        JointSignals.from_text(text.replace("[2, 1]", "[2, 2]"))
 
 
 def test_check_tells_by_joint_what_no_analysis_will_use(tmp_path):

@@ -88,6 +88,11 @@ def test_a_mesh_is_found_where_ros_puts_packages(tmp_path: Path, monkeypatch: py
 def test_joints_that_move_no_mass_are_held_fast_and_told(tmp_path: Path):
     notes = MujocoBody.load(written(tmp_path), contacts=False).notes
     assert notes == ("held fast, because what they move has no mass: grip",)
+    (tmp_path / "arm.yaml").write_text(
+        "body: {urdf: arm.urdf, contacts: false}\njoints: {shoulder: {}, grip: {}}\n"
+    )
+    with pytest.raises(InputError, match="grip: moves no mass in arm.urdf; give its link a mass there"):
+        Machine.load(tmp_path / "arm.yaml")
 
 
 def test_an_inertia_that_no_body_has_is_replaced_by_the_nearest_and_told(tmp_path: Path):

@@ -259,6 +259,10 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
         keys["joints"].fail("names no joint")
     for name, node in given.items():
         if name not in body.joints:
+            if name in body.idle:
+                node.fail(
+                    f"moves no mass in {body.path.name}; give its link a mass there, or leave the joint out here"
+                )
             node.fail(f"{body.path.name} has no such joint; it has {', '.join(body.joints)}")
         if name == body.base:
             node.fail("is the joint of the base, which nothing drives; leave it out here")

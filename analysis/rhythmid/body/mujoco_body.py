@@ -51,6 +51,7 @@ class MujocoBody(Body):
     ends: Mapping[str, Array] = field(default_factory=dict)
     centres: Mapping[str, Array] = field(default_factory=dict)  # (3,) of links, where they are not the file's
     notes: tuple[str, ...] = ()  # parts of the file that were left out or changed, in words
+    idle: tuple[str, ...] = ()  # joints of the file that are held fast because they move no mass
     hold: Mapping[str, float] = field(default_factory=dict)  # positions of the file's joints that are fixed
     # for links whose inertia is not the file's, the ten numbers (10,) without a payload
     replaced: Mapping[str, Array] = field(default_factory=dict)
@@ -106,6 +107,7 @@ class MujocoBody(Body):
             contacts,
             passive,
             notes=(*robot.notes, *told),
+            idle=robot.idle,
             hold=hold or {},
         )
         return replace(made, ends=end_links(model, made.links))

@@ -51,10 +51,12 @@ class RobotFile:
     ----------
     spec : a `mujoco.MjSpec`, to be compiled.
     notes : parts that were left out or changed, in words.
+    idle : joints that were taken out because they move no mass.
     """
 
     spec: Any
     notes: tuple[str, ...] = ()
+    idle: tuple[str, ...] = ()
 
 
 def read_robot(
@@ -97,7 +99,10 @@ def read_robot(
         _leave_meshes_out(spec)
     told.extend(_with_possible_inertias(spec))
     _hold(spec, hold or {}, path)
-    return RobotFile(spec, (*told, *_held_fast(spec), *_coupled(spec)))
+    idle = _held_fast(spec)
+    if idle:
+        told.append(f"held fast, because what they move has no mass: {', '.join(idle)}")
+    return RobotFile(spec, (*told, *_coupled(spec)), idle)
 
 
 def _require_text(spec: Any, path: Path) -> None:
@@ -282,12 +287,12 @@ def _compiled(spec: Any, path: Path) -> Any:
             raise refused(path, error) from None
 
 
-def _held_fast(spec: Any) -> Iterator[str]:
-    """Remove the joints that move no mass, such as those of a gripper that is described only by its shapes."""
+def _held_fast(spec: Any) -> tuple[str, ...]:
+    """Remove the joints that move no mass, such as those of a gripper that is described only by its shapes; their names."""
     idle = [joint for joint in spec.joints if _mass_beyond(joint.parent) == 0.0]
-    if idle:
-        yield f"held fast, because what they move has no mass: {', '.join(joint.name for joint in idle)}"
+    names = tuple(joint.name for joint in idle)
     _take_out(spec, idle)
+    return names
 
 
 def _coupled(spec: Any) -> Iterator[str]:

@@ -229,12 +229,17 @@ def _check_scale(channel: Node | None, names: Iterable[str]) -> None:
 
 
 def _check_columns(channel: Node | None, names: Collection[str]) -> None:
-    """Raise InputError where a channel lists more or fewer columns than there are joints."""
+    """Raise InputError where a channel lists more or fewer columns than there are joints, or one twice."""
     column = channel.value.get("column") if channel is not None and isinstance(channel.value, dict) else None
-    if column is not None and isinstance(column.value, list) and len(column.value) != len(names):
+    if column is None or not isinstance(column.value, list):
+        return
+    if len(column.value) != len(names):
         column.fail(
             f"lists {len(column.value)} columns of {len(names)} joints; give each joint one, in the order of 'joints:'"
         )
+    listed = [one.value for one in column.value]
+    if twice := [one for one in listed if listed.count(one) > 1]:
+        column.fail(f"lists {twice[0]} for more than one joint; give each joint a column of its own")
 
 
 def _for_joint(node: Node, joint: str, own: str, place: int) -> Node:

@@ -93,7 +93,7 @@ def _moved(record: JointRecord) -> float:
 
 def _changes(motion: RecordedMotion, readings: Readings) -> float:
     """How much a reading changes: what is the same at every joint is one change, an exchange of two joints is one."""
-    moved = sum(one.source != own.source for one, own in zip(readings, motion.as_declared, strict=True))
+    moved = sum(one.place != own.place for one, own in zip(readings, motion.as_declared, strict=True))
     found = float((moved + 1) // 2)
     for channel, cost in (("position", POSITION_CHANGE), ("effort", 1.0)):
         made = [_sort(getattr(one, channel)) for one in readings]
@@ -177,6 +177,9 @@ def _changed(motion: RecordedMotion, readings: Readings) -> Iterator[Readings]:
             yield _with(readings, place, changed)
     for places in combinations(range(len(readings)), 2):
         yield _moved_round(readings, places)
+        if not any(motion.joints[place] in motion.computed for place in places):
+            yield _moved_round(readings, places, efforts=False)
+            yield _moved_round(readings, places, motions=False)
 
 
 def _cycled(readings: Readings) -> Iterator[Readings]:
@@ -186,11 +189,18 @@ def _cycled(readings: Readings) -> Iterator[Readings]:
         yield _moved_round(readings, (one, third, other))
 
 
-def _moved_round(readings: Readings, places: Sequence[int]) -> Readings:
-    """The reading with the sources of some joints shifted cyclically by one."""
+def _moved_round(
+    readings: Readings, places: Sequence[int], motions: bool = True, efforts: bool = True
+) -> Readings:
+    """The reading with the motions and efforts of some joints, or one of the two, shifted cyclically by one."""
     made = list(readings)
     for place, following in zip(places, (*places[1:], places[0]), strict=True):
-        made[place] = replace(readings[place], source=readings[following].source)
+        own, other = readings[place], readings[following]
+        made[place] = replace(
+            own,
+            source=other.source if motions else own.source,
+            driven=other.driven if efforts else own.driven,
+        )
     return tuple(made)
 
 
@@ -199,7 +209,7 @@ def _told_alone(motion: RecordedMotion, found: Readings) -> Readings:
     kinds = [(_sort(one.position), _sort(one.effort)) for one in found]
     return tuple(
         one
-        if known.told >= LEAST_EXPLAINED or one.source != own.source or 2 * kinds.count(kind) > len(found)
+        if known.told >= LEAST_EXPLAINED or one.place != own.place or 2 * kinds.count(kind) > len(found)
         else own
         for one, own, known, kind in zip(
             found, motion.as_declared, motion.balanced(found), kinds, strict=True
@@ -268,14 +278,7 @@ def _rms(values: Iterable[float]) -> float:
 
 def _words(record: JointRecord, motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]) -> str:
     joints, left = motion.joints, motion.balanced(found)
-    said: list[str] = []
-    moved = [
-        f"{joint} is recorded as {joints[one.source]}"
-        for joint, one in zip(joints, found, strict=True)
-        if joints[one.source] != joint
-    ]
-    if moved:
-        said.append(f"the joints seem to be recorded in another order: {', '.join(moved)}; correct 'joints:'")
+    said = list(_orders(joints, found))
     for channel in ("position", "effort"):
         factors: dict[str, dict[str, float]] = {}
         for joint, one, turns in zip(joints, found, motion.rotational, strict=True):
@@ -306,6 +309,34 @@ def _words(record: JointRecord, motion: RecordedMotion, found: Readings, declare
     ):
         said[-1] += " (or the same for the other joints: the mirrored machine moves alike)"
     return f"{'; '.join(said)} in signals.yaml. {_gain(motion, left, declared)}"
+
+
+def _orders(joints: Sequence[str], found: Readings) -> Iterator[str]:
+    """What is recorded in another order, and where to correct it."""
+    for what, place, where in (
+        (
+            "joints seem",
+            [one.source if one.source == one.driven else k for k, one in enumerate(found)],
+            "correct 'joints:'",
+        ),
+        (
+            "positions alone seem",
+            [one.source if one.source != one.driven else k for k, one in enumerate(found)],
+            "list its columns in the order of 'joints:' under 'output:'",
+        ),
+        (
+            "efforts alone seem",
+            [one.driven if one.source != one.driven else k for k, one in enumerate(found)],
+            "list its columns in the order of 'joints:' under 'effort:'",
+        ),
+    ):
+        moved = [
+            f"{joint} is recorded as {joints[at]}"
+            for joint, at in zip(joints, place, strict=True)
+            if joints[at] != joint
+        ]
+        if moved:
+            yield f"the {what} to be recorded in another order: {', '.join(moved)}; {where}"
 
 
 def _gain(motion: RecordedMotion, left: Sequence[Balanced], declared: Sequence[Balanced]) -> str:

@@ -41,14 +41,20 @@ LONGEST = 60.0  # [s] length of a record that is used, from its start
 
 @dataclass(frozen=True)
 class Reading:
-    """One reading of a joint: recorded as joint number `source`, with factors for its position and its effort.
+    """One reading of a joint: its motion is recorded as that of joint number `source`, its effort as that of number `driven`, with factors for both.
 
     An effort that was not recorded follows from the positions and has their factor.
     """
 
     source: int
+    driven: int
     position: float = 1.0
     effort: float = 1.0
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """The joints as which motion and effort are recorded."""
+        return self.source, self.driven
 
 
 @dataclass(frozen=True)
@@ -118,7 +124,7 @@ class RecordedMotion:
     @cached_property
     def as_declared(self) -> tuple[Reading, ...]:
         """The reading declared in signals.yaml."""
-        return tuple(Reading(k) for k in range(len(self.joints)))
+        return tuple(Reading(k, k) for k in range(len(self.joints)))
 
     def balanced(self, readings: tuple[Reading, ...], free: bool = False) -> tuple[Balanced, ...]:
         """Effort residuals of each joint under a reading; with `free`, efforts may be in any unit."""
@@ -199,7 +205,7 @@ class RecordedMotion:
             for one in (self._rate, self._acceleration)
         )
         effort = [
-            (one.position if joint in self.computed else one.effort) * self._effort[clear, one.source]
+            (one.position if joint in self.computed else one.effort) * self._effort[clear, one.driven]
             for joint, one in zip(self.joints, readings, strict=True)
         ]
         return Seen(pose, rate, acceleration, tuple(effort))
