@@ -159,6 +159,19 @@ def test_a_reference_in_another_unit_than_the_position_that_follows_it_is_told(l
     assert f"scale: {{knee: 0.0174533}}  under '{role}:'" in found
 
 
+def test_references_of_all_joints_in_another_unit_are_told_in_one_line(leg):
+    machine, _ = leg
+    record = played(machine, {"hip": (0.6, 0.3), "knee": (-1.2, 0.3)}, 3.0, effort=False)
+    joints = {
+        joint: replace(one, input=replace(one.input, value=DEGREES * one.input.value))
+        for joint, one in record.joints.items()
+        if one.input is not None
+    }
+    found = likely_joint_mend(machine, [replace(record, joints=joints)])
+    assert found is not None and "the reference of hip, knee is 5" in found
+    assert "scale: {hip: 0.0174533, knee: 0.0174533}  under 'input:'" in found
+
+
 def test_a_slide_in_millimetres_is_told(tmp_path: Path):
     (tmp_path / "crane.xml").write_text(
         '<mujoco><worldbody><body name="cart"><joint name="slide" type="slide" axis="1 0 0"/>'

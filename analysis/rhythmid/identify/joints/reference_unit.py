@@ -21,6 +21,7 @@ def reference_mend(record: JointRecord, rotational: Sequence[bool]) -> str | Non
     ----------
     rotational : for each joint of the record, whether it is rotational.
     """
+    found: dict[tuple[str, str, str], dict[str, tuple[float, float]]] = {}
     for (joint, one), turns in zip(record.joints.items(), rotational, strict=True):
         factor, unit = FACTORS[turns]
         ratio = _ratio(one)
@@ -28,12 +29,18 @@ def reference_mend(record: JointRecord, rotational: Sequence[bool]) -> str | Non
             continue
         for role, other, size in (("reference", "position", ratio), ("position", "reference", 1.0 / ratio)):
             if abs(size * factor - 1.0) < NAMED:
-                key = "input" if role == "reference" else "output"
-                return (
-                    f"{record.name}: the {role} of {joint} is {size:.0f} times as large as its {other}, as {unit}; write  "
-                    f"scale: {{{joint}: {factor:.6g}}}  under '{key}:' in signals.yaml"
-                )
-    return None
+                found.setdefault((role, other, unit), {})[joint] = size, factor
+    if not found:
+        return None
+    (role, other, unit), joints = next(iter(found.items()))
+    sizes = sorted(round(size) for size, _ in joints.values())
+    times = f"{sizes[0]}" if sizes[0] == sizes[-1] else f"{sizes[0]} to {sizes[-1]}"
+    scales = ", ".join(f"{joint}: {factor:.6g}" for joint, (_, factor) in joints.items())
+    key = "input" if role == "reference" else "output"
+    return (
+        f"{record.name}: the {role} of {', '.join(joints)} is {times} times as large as its {other}, as {unit}; write  "
+        f"scale: {{{scales}}}  under '{key}:' in signals.yaml"
+    )
 
 
 def _ratio(record: Record) -> float | None:
