@@ -169,6 +169,16 @@ def test_words_of_other_languages_mean_what_they_do(tmp_path, position, velocity
     }  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("output", "effort", "error"),
+    [("Saída", "Esforço", "Erro"), ("salida", "esfuerzo", "error"), ("uscita", "sforzo", "errore")],
+)
+def test_an_effort_named_in_another_language_drives_an_output_named_in_it(tmp_path, output, effort, error):
+    target = 1.5
+    path = table(tmp_path, **{output: X, error: target - X, effort: 0.4 * FORCE})
+    assert roles_of(path) == {"output": output, "input": effort}
+
+
 @pytest.mark.parametrize("name", ["tiempo", "temps", "Zeit", "tempo (ms)"])
 def test_a_time_is_known_in_other_languages(tmp_path, name):
     uneven = np.cumsum(np.random.default_rng(0).integers(1, 4, len(TIME)))  # ms

@@ -20,7 +20,7 @@ WORDS: dict[Quantity, frozenset[str]] = {
     ),
     "effort": frozenset(
         "effort efforts torque torques tor torq tau force forces wrench current currents cur curr voltage volt volts pwm duty trq "
-        "moment iq drehmoment kraft strom spannung couple coppia fuerza forza forca corriente corrente courant tensione tensao".split()
+        "moment iq drehmoment kraft strom spannung couple coppia fuerza forza forca esfuerzo sforzo esforco corriente corrente courant tensione tensao".split()
     ),
 }  # fmt: skip
 MOTIONS: tuple[Quantity, ...] = (
@@ -73,7 +73,8 @@ SHAKEN = frozenset("excitation exc shaking vibration".split())  # words for a mo
 DRIVING = frozenset("input in stimulus ctrl control drive entrada estimulo ingresso entree eingang".split())
 FORCES = frozenset("force forces wrench".split())  # of a contact as well as of an actuator
 GENERIC = frozenset(
-    "dof joint joints motor data robot array value values actuator axis trajectory controller controllers in out input output grosse groesse".split()
+    "dof joint joints motor data robot array value values actuator axis trajectory controller controllers in out input output "
+    "salida saida uscita sortie ausgang grosse groesse".split()
 )
 JOINT = frozenset("joint joints".split())  # added by drivers to joint names arbitrarily
 POSED = frozenset(
