@@ -53,3 +53,16 @@ def test_a_long_delay_is_doubted_of_a_command_and_not_guessed_of_a_measured_curr
     assert "look like a delay" in asked.doubts["input_delay"]
     measured = start([log(tmp_path, {"position [rad]": position, "motor current [A]": WAVE})]).nominal
     assert measured.model.term("input_delay") is None
+
+
+def test_a_part_of_an_effort_that_a_model_computes_drives_only_where_nothing_else_does(tmp_path):
+    position, velocity = motion(WAVE)
+    parts = {
+        "position [rad]": position,
+        "gravity torque [Nm]": 2.0 * np.sin(position),
+        "coriolis torque [Nm]": 0.1 * velocity,
+    }
+    whole = start([log(tmp_path, {**parts, "applied torque [Nm]": WAVE})]).guess.roles.choices
+    assert str(whole["input"].recorded) == "applied torque [Nm]" and "effort" not in whole
+    alone = start([log(tmp_path, parts)]).guess.roles.choices
+    assert str(alone["input"].recorded) in parts

@@ -87,8 +87,12 @@ def test_a_command_in_another_unit_comes_before_a_current_that_tells_less_of_the
 
 
 @pytest.mark.parametrize(
-    ("names", "kind"), [(("number", "input"), "velocity"), (("position", "input"), "position")]
-)
+    ("names", "kind"),
+    [
+        (("number", "input"), "velocity"), (("y", "u"), "velocity"),
+        (("position", "input"), "position"), (("x", "u"), "position"),
+    ],
+)  # fmt: skip
 def test_a_number_without_a_name_that_follows_as_a_speed_does_is_a_speed(tmp_path, names, kind):
     steps = np.repeat(np.random.default_rng(5).uniform(1.0, 5.0, 30), 100)
     _, velocity = motion(steps)

@@ -7,7 +7,7 @@ from rhythmid.record.inventory import Recorded
 from rhythmid.record.signals import InputKind
 from rhythmid.start.direction import COPY, doubt_of_direction
 from rhythmid.start.force_unit import doubt_of_units, matching, of_one_unit
-from rhythmid.start.meaning import meaning_of, says_base, says_it_was_read
+from rhythmid.start.meaning import is_modelled, meaning_of, says_base, says_it_was_read
 from rhythmid.start.relation import GOES_ALONG, HARDLY, coherent, follows
 from rhythmid.start.role_choice import Ask, Choice, Known, chosen, pick, ranked_by_worth, strongest
 from rhythmid.start.vocabulary import Quantity
@@ -30,6 +30,7 @@ def drivers(
     efforts = [one for one in rest if one.quantity == "effort"]
     forcing = [one for one in efforts if one.meaning.forcing]
     efforts = [one for one in efforts if not one.meaning.forcing]
+    efforts = [one for one in efforts if not is_modelled(one.one)] or efforts
     commanded = [one for one in efforts if one.meaning.commanded]
     sensed = [one for one in efforts if not one.meaning.commanded]
     sensed = [

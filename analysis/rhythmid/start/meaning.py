@@ -29,6 +29,7 @@ from rhythmid.start.vocabulary import (
     LETTERS,
     MEASURED,
     MECHANICAL,
+    MODELLED,
     MOTION,
     MOTIONS,
     NO_EFFORT,
@@ -229,6 +230,11 @@ def says_who_asks(one: Recorded) -> bool:
 def says_it_was_read(one: Recorded) -> bool:
     """Whether a word of its name says that it is a sensor reading."""
     return bool({*words_of(one.said), *words_of(one.topic)} & READ)
+
+
+def is_modelled(one: Recorded) -> bool:
+    """Whether its name says that it is one part of an effort, which only a model separates from the others."""
+    return bool(set(words_of(one.said)) & MODELLED) and not says_it_was_read(one)
 
 
 def _controlled(one: Recorded, near: list[str]) -> set[str]:

@@ -56,11 +56,11 @@ CONTROLLED_SHORT = frozenset("con ctr".split())
 # commanded by a policy; in a topic it denotes a ROS action
 COMMANDED_COLUMNS = frozenset(["action", "actions"])
 MEASURED = frozenset(
-    "meas measured sensed act actual state states observation feedback fb est estimated present real raw filt filtered smoothed response "
+    "meas measured sensed act actual applied state states observation feedback fb est estimated present real raw filt filtered smoothed response "
     "encoder encoders enc ist istwert mesure medido medida misurato".split()
 )
 # a sensor reading; among several efforts it is preferred to one that was filtered, estimated or modelled
-READ = frozenset("meas measured act actual feedback fb present sensed".split())
+READ = frozenset("meas measured act actual applied feedback fb present sensed".split())
 PLACES = frozenset(
     "motor load link gear rotor shaft sensor imu camera vicon mocap optitrack laser lidar".split()
 )
@@ -104,4 +104,6 @@ COMPUTED = frozenset(
     "error errors err erreur fehler errore erro ecart abweichung regelabweichung regeldifferenz integral integrale integrator "
     "term terms pterm iterm dterm".split()
 )
+# parts of an effort that a controller computes from a model; the friction of a test rig may be measured
+MODELLED = frozenset("gravity gravitational coriolis centrifugal centripetal".split())
 IGNORED = COMPUTED | frozenset("temp temperature battery power status mode".split())
