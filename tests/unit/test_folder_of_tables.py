@@ -67,8 +67,8 @@ def _first(folder):
 
 
 def test_runs_of_one_layout_and_runs_at_different_times_are_refused(tmp_path):
-    for number in (1, 2):
-        stream(tmp_path / "runs", f"run{number}", 100.0, {"angle": np.sin}, began=0.0)
+    for name in ("first", "second"):
+        stream(tmp_path / "runs", name, 100.0, {"angle": np.sin}, began=0.0)
     with pytest.raises(InputError, match="same columns, so that they are several recordings"):
         inventory(tmp_path / "runs")
     stream(tmp_path / "days", "arm", 100.0, {"angle": np.sin})
@@ -95,3 +95,42 @@ def test_tables_of_one_folder_without_times_are_read_by_the_rate_that_is_given(t
     signals = tmp_path.parent / "signals.yaml"
     signals.write_text(begun.signals, encoding="utf-8")
     np.testing.assert_allclose(load(tmp_path, signals).output.time, time)
+
+
+def pair(folder, steps):
+    """The angles of two joints that were asked for, and those that were measured 80 ms later, in tables with the same
+    names and stamps."""
+    time = np.cumsum(steps)
+    folder.mkdir()
+    for name, lag in (("asked", 0.0), ("reached", 0.08)):
+        late = time - lag
+        angles = [0.5 * np.sin(2.0 * late) + 0.2 * np.sin(5.0 * late), 0.1 * np.cos(3.0 * late)]
+        table = np.column_stack([time, *angles])
+        np.savetxt(folder / f"{name}.csv", table, delimiter=",", header="t,hip,knee", comments="")
+    return folder
+
+
+def test_tables_with_the_same_names_and_the_same_uneven_stamps_are_one_recording(tmp_path):
+    uneven = 0.01 + np.random.default_rng(1).uniform(0.0, 1e-3, 900)
+    begun = start([pair(tmp_path / "log", uneven)])
+    roles = {role: choice.recorded.column for role, choice in begun.guess.roles.choices.items()}
+    assert roles == {"output": "reached.hip", "input": "asked.hip"}
+    assert begun.guess.roles.input_kind == "reference"
+    with pytest.raises(InputError, match="several recordings"):
+        inventory(pair(tmp_path / "even", np.full(900, 0.01)))
+
+
+def test_a_table_of_nothing_but_times_is_the_clock_of_the_tables_with_as_many_rows(tmp_path):
+    time = np.cumsum(np.full(800, 0.004))
+    angles = np.column_stack([0.3 * np.sin(3.0 * time), 0.1 * np.cos(5.0 * time)])
+    for name, table in (
+        ("position", angles),
+        ("torque", -2.0 * angles),
+        ("filtered", angles[1:]),
+        ("stamp", time),
+    ):
+        np.savetxt(tmp_path / f"data_{name}.csv", table, delimiter=",")
+    begun = start([tmp_path])
+    roles = {role: choice.recorded.column for role, choice in begun.guess.roles.choices.items()}
+    assert roles == {"output": "data_position.0", "input": "data_torque.0"}
+    assert [note.split(" ")[0] for note in begun.guess.inventory.notes] == ["data_filtered.csv"]

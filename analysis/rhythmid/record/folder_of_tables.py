@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 TIME = "time [s]"
 FEWEST = 2  # tables that are streams of one recording
 COMMON = 0.5  # least share of the shorter of two tables' time that the other one must cover, too
+EVEN = 1e-3  # share of a step by which even stamps may differ: they are written in whole us or ms
 BAGS = ("*.mcap*", "*.db3*", "*.bag", "metadata.yaml")
 
 
@@ -33,6 +34,10 @@ class Part:
     def named(self, column: str) -> str:
         """The name of a column in the table of the whole folder."""
         return f"{self.name}.{column}"
+
+    @property
+    def rows(self) -> int:
+        return len(self.columns[0][1])
 
 
 def is_folder_of_tables(path: Path) -> bool:
@@ -54,13 +59,14 @@ def read_folder(
     path: Path, vectors: Callable[[Path], list[tuple[str, Array]]]
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """The columns of all tables, `motor.current` for the column `current` of motor.csv, on the times of all of them and
-    NaN where a table has no row; and a message on each table that is left out. Where none of them has a time, their rows
-    are of one clock, and the columns are those of all.
+    NaN where a table has no row; and a message on each table that is left out. A table that holds nothing but a time is
+    the clock of those without one that have as many rows. Where none of them has a time, their rows are of one clock, and
+    the columns are those of all.
 
     `vectors` reads the columns of one table. Raises InputError where the tables are several recordings.
     """
     streams: dict[str, Stream] = {}
-    untimed: dict[str, Any] = {}
+    untimed: list[tuple[Part, str]] = []
     notes: list[str] = []
     for file in _tables_in(path):
         try:
@@ -71,14 +77,28 @@ def read_folder(
         try:
             streams[part.name] = _stream(file, part)
         except InputError as error:
-            notes.append(_left_out(file, error))
-            untimed |= {part.named(name): value for name, value in part.columns}
+            untimed.append((part, _left_out(file, error)))
     if not streams and untimed:
-        return untimed, ()
+        return {part.named(name): value for part, _ in untimed for name, value in part.columns}, ()
+    notes += _timed_by_a_clock(streams, untimed)
     if not streams:
         raise InputError(f"{path}: none of its tables can be read: {'; '.join(notes)}")
     _require_one_recording(path, streams)
     return on_all_times(list(streams.values()), TIME), tuple(notes)
+
+
+def _timed_by_a_clock(streams: dict[str, Stream], untimed: list[tuple[Part, str]]) -> list[str]:
+    """Give the tables without a time that of the only table that holds nothing else, where they have as many rows, and
+    return the messages on the others."""
+    clocks = [one for one in streams.values() if not one.columns]
+    left: list[str] = []
+    for part, message in untimed:
+        if len(clocks) == 1 and part.rows == len(clocks[0].time):
+            values = {part.named(name): value for name, value in part.columns}
+            streams[part.name] = Stream(clocks[0].time, values)
+        else:
+            left.append(message)
+    return left
 
 
 def _left_out(file: Path, error: InputError) -> str:
@@ -108,8 +128,12 @@ def _stream(file: Path, part: Part) -> Stream:
 def _require_one_recording(path: Path, streams: Mapping[str, Stream]) -> None:
     """Raise InputError where the tables do not share their time, or are runs of one layout on clocks of their own."""
     apart = f"give them one by one, such as  rhythmid init {path}/*.csv"
-    layouts = {tuple(name.removeprefix(f"{own}.") for name in one.columns) for own, one in streams.items()}
-    if len(layouts) < len(streams) and min(float(one.time[0]) for one in streams.values()) < CALENDAR:
+    layouts: dict[tuple[str, ...], Stream] = {}
+    for own, one in streams.items():
+        first = layouts.setdefault(tuple(name.removeprefix(f"{own}.") for name in one.columns), one)
+        dated = min(float(each.time[0]) for each in streams.values()) >= CALENDAR
+        if first is one or dated or _has_the_same_stamps(first.time, one.time):
+            continue
         raise InputError(
             f"{path}: tables in it have the same columns, so that they are several recordings; {apart}"
         )
@@ -121,3 +145,14 @@ def _require_one_recording(path: Path, streams: Mapping[str, Stream]) -> None:
             raise InputError(
                 f"{path}: {own} and {longest} were not recorded at the same time: they are several recordings; {apart}"
             )
+
+
+def _has_the_same_stamps(first: Array, second: Array) -> bool:
+    """Whether two tables were written row by row with one stamp each, or have the times of one clock: no two recordings
+    have the same uneven stamps, while even ones that begin at zero are those of any."""
+    if first is second:
+        return True
+    if len(first) != len(second) or not np.array_equal(first, second):
+        return False
+    step = np.diff(first)
+    return bool(np.ptp(step) > EVEN * np.median(step))
