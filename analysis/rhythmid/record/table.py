@@ -32,6 +32,7 @@ from rhythmid.record.rows_without_time import without_untimed_rows
 from rhythmid.record.table_clock import is_called_time
 from rhythmid.record.text_file import COMPRESSED
 from rhythmid.record.text_table import TEXT, text_table
+from rhythmid.record.unfilled_rows import without_unfilled_rows
 
 HDF5 = (".h5", ".hdf5")
 SUFFIXES = (".mat", *HDF5, ".npz", ".npy", ".parquet", *EXCEL, *JSON, *TEXT)
@@ -94,8 +95,9 @@ class Table:
                 check_content(path)
                 found = read(path)
             columns, notes = found if isinstance(found, tuple) else (found, ())
-            columns, untimed = without_untimed_rows(with_common_time(with_joined_stamps(columns)))
-            notes = (*notes, *untimed)
+            columns, unfilled = without_unfilled_rows(with_common_time(with_joined_stamps(columns)))
+            columns, untimed = without_untimed_rows(columns)
+            notes = (*notes, *unfilled, *untimed)
         except FileNotFoundError:
             raise InputError(f"{path}: no such file") from None
         except InputError:
