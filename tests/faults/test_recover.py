@@ -13,7 +13,7 @@ from read_back import by_us, require_readable_by_others
 from rhythmid.errors import InputError
 from rhythmid.record.bag import Bag
 from rhythmid.record.bag_report import quality_report
-from rhythmid.record.bag_writer import BagWriter, add_topic, new_bag
+from rhythmid.record.bag_writer import BagWriter, add_topic, new_bag, write_bag
 from rhythmid.record.mcap_writer import CHUNK
 from rhythmid.record.messages import Messages
 from rhythmid.record.recover import recover
@@ -95,6 +95,30 @@ def test_a_flipped_bit_is_told_or_changes_nothing(storage, whole, share, flipped
     elif report.damage:
         assert not any(line.endswith(": flawless") for line in report.lines())
     shutil.rmtree(bag)
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_what_is_recovered_was_written_so_and_the_rest_is_counted(storage, spoilt, whole, tmp_path):
+    def change(data):
+        data[data.index(VALUES[N // 2].tobytes()) + 3] ^= 1
+
+    done = recover(spoilt(storage, change), tmp_path / "out")
+    written, kept = by_us(whole[storage]), by_us(tmp_path / "out")
+    assert set(kept) < set(written) and done.notes
+    assert 2 * N - 2 * PART <= len(kept) == 2 * N - sum(done.lost.values())
+    assert quality_report(tmp_path / "out").damage == ()
+
+
+def test_a_flipped_bit_of_a_long_database_costs_a_thousand_messages_at_most(tmp_path):
+    number = 4000
+    rows = Messages(np.arange(number, dtype=np.int64) * 1_000_000, effort=np.arange(number) + 0.5)
+    bag = write_bag(tmp_path / "bag", {"/excitation": rows}, storage="sqlite3")
+    (file,) = bag.glob("*.db3")
+    data = bytearray(file.read_bytes())
+    data[data.index(np.float64(2500.5).tobytes())] ^= 1
+    file.write_bytes(data)
+    done = recover(bag, tmp_path / "out")
+    assert done.counts["/excitation"] == number - 1000 and done.lost["/excitation"] == 1000
 
 
 @pytest.mark.parametrize("storage", STORAGES)

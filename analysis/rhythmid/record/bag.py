@@ -16,7 +16,7 @@ from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.mcap_reader import McapReader
 from rhythmid.record.sqlite_reader import SqliteReader
 
-READERS = {".mcap": McapReader, ".db3": SqliteReader}
+SQLITE = ".db3"
 SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
 
 
@@ -36,13 +36,13 @@ class Bag:
     notes : messages about the state of the files, one line each; empty for a complete recording.
     stated : number of messages by topic, from metadata.yaml or the end of the files; empty where they do not state it.
 
-    With `verify` the checksums of the files are compared. Raises InputError when there is no such recording.
+    With `verify` the checksums of the files are compared, with `intact` messages whose checksum is wrong are left out. Raises InputError when there is no such recording.
     """
 
-    def __init__(self, path: str | Path, verify: bool = False) -> None:
+    def __init__(self, path: str | Path, verify: bool = False, intact: bool = False) -> None:
         self.path = Path(path)
         self.stated: dict[str, int] = {}
-        self._verify = verify
+        self._verify, self._intact = verify, intact
         self.topics: dict[str, Topic] = {}
         self.truncated = False
         self.notes: list[str] = []
@@ -110,7 +110,8 @@ class Bag:
                 yield from self._read(plain, wanted)
 
     def _read(self, file: Path, wanted: Wanted) -> Iterator[Block]:
-        reader = READERS[file.suffix](file)
+        # a chunk of an MCAP file whose checksum is wrong is never read
+        reader = SqliteReader(file, self._intact) if file.suffix == SQLITE else McapReader(file)
         try:
             yield from reader.blocks(wanted)
         except InputError:

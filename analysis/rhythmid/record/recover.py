@@ -54,12 +54,12 @@ TELLING = 1.0  # [s] between two progress messages
 
 
 def recover(path: str | Path, out: str | Path, storage: Storage = "mcap", tell: Tell = silent) -> Recovered:
-    """Write every complete message of the incomplete or damaged bag `path` to the new bag `out`.
+    """Write every intact message of the incomplete or damaged bag `path` to the new bag `out`.
 
     Topics, types, times and QoS are kept; the old bag is not changed. `tell` is called regularly with the
     number of messages written. Raises InputError when nothing can be read, or `out` exists or cannot be written.
     """
-    bag = Bag(path, verify=True)
+    bag = Bag(path, verify=True, intact=True)
     connections: dict[str, Connection] = {}
     counts: dict[str, int] = {}
     left_out: dict[str, str] = {}

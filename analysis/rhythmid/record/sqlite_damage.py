@@ -55,20 +55,39 @@ def wrong_checksums(database: sqlite3.Connection) -> list[str]:
             found.append(f"sqlite finds it damaged: {' '.join(str(answer).split())[:200]}")
         if not database.execute("SELECT 1 FROM sqlite_master WHERE name = 'checksums'").fetchone():
             return found
-        before = 0
-        for last, stated in database.execute("SELECT last_id, crc32 FROM checksums ORDER BY last_id"):
-            summed, count = 0, 0
-            rows = "SELECT topic_id, timestamp, data FROM messages WHERE id > ? AND id <= ? ORDER BY id"
-            for topic, time, data in database.execute(rows, (before, last)):
-                summed, count = checksum(topic, time, data, summed), count + 1
-            if summed != stated or count != last - before:
-                found.append(
-                    f"messages {before + 1} to {last} are not what was written: their checksum is wrong"
-                )
-            before = last
+        wrong, before = _compared(database)
+        found += [
+            f"messages {first} to {last} are not what was written: their checksum is wrong"
+            for first, last in wrong
+        ]
         beyond = database.execute("SELECT count(*) FROM messages WHERE id > ?", (before,)).fetchone()[0]
         if beyond:
             found.append(f"{beyond} messages have no checksum")
     except (sqlite3.DatabaseError, TypeError, ValueError, struct.error) as error:
         found.append(f"its checksums cannot be compared: {error}")
     return found
+
+
+def wrong_messages(database: sqlite3.Connection) -> list[tuple[int, int]]:
+    """First and last row of `messages` of every checksum that is wrong; empty where there are none, or they cannot be compared."""
+    try:
+        if not database.execute("SELECT 1 FROM sqlite_master WHERE name = 'checksums'").fetchone():
+            return []
+        return _compared(database)[0]
+    except (sqlite3.DatabaseError, TypeError, ValueError, struct.error):
+        return []
+
+
+def _compared(database: sqlite3.Connection) -> tuple[list[tuple[int, int]], int]:
+    """The rows of the checksums that are wrong, and the last row that has a checksum."""
+    wrong: list[tuple[int, int]] = []
+    before = 0
+    for last, stated in database.execute("SELECT last_id, crc32 FROM checksums ORDER BY last_id"):
+        summed, count = 0, 0
+        rows = "SELECT topic_id, timestamp, data FROM messages WHERE id > ? AND id <= ? ORDER BY id"
+        for topic, time, data in database.execute(rows, (before, last)):
+            summed, count = checksum(topic, time, data, summed), count + 1
+        if summed != stated or count != last - before:
+            wrong.append((before + 1, last))
+        before = last
+    return wrong, before

@@ -17,7 +17,7 @@ import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted, by_topic
-from rhythmid.record.sqlite_damage import in_order, next_readable, wrong_checksums
+from rhythmid.record.sqlite_damage import in_order, next_readable, wrong_checksums, wrong_messages
 from rhythmid.record.sqlite_pages import Pages
 
 _ROWS = 50_000  # rows fetched at once,
@@ -31,11 +31,13 @@ class SqliteReader:
     A journal beside the file holds the data that sqlite needs to undo or finish the last transaction. That requires
     writing, so file and journal are copied and the copy is opened; the recording itself is never changed. A
     truncated file is copied, too, and read up to its end. A file that sqlite cannot open because its beginning is
-    damaged is read page by page.
+    damaged is read page by page. With `intact` messages whose checksum is wrong are left out.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, intact: bool = False) -> None:
         self.path = path
+        self._intact = intact
+        self._wrong: list[tuple[int, int]] = []
         self.topics: dict[str, Topic] = {}
         self.damage: list[str] = []
         self.by_pages = False
@@ -86,6 +88,8 @@ class SqliteReader:
             database.execute(
                 "PRAGMA trusted_schema = OFF"
             )  # no function with side effects, in case the schema calls one
+            if self._intact and not self.truncated:
+                self._wrong = wrong_messages(database)
             numbered = _topics(database)
             self.topics = {topic.name: topic for topic in numbered.values()}
             chosen = {number: topic for number, topic in numbered.items() if wanted(topic)}
@@ -141,7 +145,8 @@ class SqliteReader:
             try:
                 for number, *row in database.execute(query, (self._last,)):
                     self._last = in_order(number, self._last)
-                    yield row[0], row[1], row[2]
+                    if not any(first <= number <= last for first, last in self._wrong):
+                        yield row[0], row[1], row[2]
                 return
             except sqlite3.DatabaseError as error:
                 following = next_readable(database, self._last)

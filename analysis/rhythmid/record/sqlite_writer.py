@@ -19,6 +19,8 @@ CHECKSUMS = "CREATE TABLE checksums(last_id INTEGER PRIMARY KEY, crc32 INTEGER N
 `crc32` covers the messages behind those of the previous row up to `last_id`.
 """
 
+_SUMMED = 1000  # messages of one checksum at most: a flipped bit costs as many in a recovery
+
 
 def checksum(topic: int, timestamp: int, data: bytes | memoryview, before: int) -> int:
     """CRC-32 continued by one message: its topic's number, receive time [ns] and bytes."""
@@ -65,12 +67,17 @@ class SqliteWriter(Sqlite3Writer):
     def _sum(self, topic: int, timestamp: int, data: bytes | memoryview) -> None:
         self._checksum = checksum(topic, timestamp, data, self._checksum)
         self._written += 1
+        if self._written - self._summed >= _SUMMED:
+            self._keep_checksum()
+
+    def _keep_checksum(self) -> None:
+        self.cursor.execute("INSERT INTO checksums VALUES (?, ?)", (self._written, self._checksum))
+        self._checksum, self._summed = 0, self._written
 
     def flush(self) -> None:
         """Commit everything written so far."""
         if self._written > self._summed:
-            self.cursor.execute("INSERT INTO checksums VALUES (?, ?)", (self._written, self._checksum))
-            self._checksum, self._summed = 0, self._written
+            self._keep_checksum()
         self.conn.commit()
 
     def close(self, version: int, metadata: str) -> None:
