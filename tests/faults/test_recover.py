@@ -97,15 +97,17 @@ def test_a_flipped_bit_is_told_or_changes_nothing(storage, whole, share, flipped
     shutil.rmtree(bag)
 
 
+@pytest.mark.parametrize("broken", [0, 4096], ids=["whole end", "without its last page"])
 @pytest.mark.parametrize("storage", STORAGES)
-def test_what_is_recovered_was_written_so_and_the_rest_is_counted(storage, spoilt, whole, tmp_path):
+def test_what_is_recovered_was_written_so_and_the_rest_is_counted(storage, broken, spoilt, whole, tmp_path):
     def change(data):
         data[data.index(VALUES[N // 2].tobytes()) + 3] ^= 1
+        return data[: len(data) - broken]
 
     done = recover(spoilt(storage, change), tmp_path / "out")
     written, kept = by_us(whole[storage]), by_us(tmp_path / "out")
     assert set(kept) < set(written) and done.notes
-    assert 2 * N - 2 * PART <= len(kept) == 2 * N - sum(done.lost.values())
+    assert 2 * N - 2 * PART - broken / 50 <= len(kept) == 2 * N - sum(done.lost.values())
     assert quality_report(tmp_path / "out").damage == ()
 
 

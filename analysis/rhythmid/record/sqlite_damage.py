@@ -58,7 +58,7 @@ def wrong_checksums(database: sqlite3.Connection) -> list[str]:
         wrong, before = _compared(database)
         found += [
             f"messages {first} to {last} are not what was written: their checksum is wrong"
-            for first, last in wrong
+            for first, last, _ in wrong
         ]
         beyond = database.execute("SELECT count(*) FROM messages WHERE id > ?", (before,)).fetchone()[0]
         if beyond:
@@ -69,25 +69,29 @@ def wrong_checksums(database: sqlite3.Connection) -> list[str]:
 
 
 def wrong_messages(database: sqlite3.Connection) -> list[tuple[int, int]]:
-    """First and last row of `messages` of every checksum that is wrong; empty where there are none, or they cannot be compared."""
+    """First and last row of `messages` of every checksum that is wrong although all its rows are there; empty where there are none, or
+    they cannot be compared."""
     try:
         if not database.execute("SELECT 1 FROM sqlite_master WHERE name = 'checksums'").fetchone():
             return []
-        return _compared(database)[0]
+        return [(first, last) for first, last, whole in _compared(database)[0] if whole]
     except (sqlite3.DatabaseError, TypeError, ValueError, struct.error):
         return []
 
 
-def _compared(database: sqlite3.Connection) -> tuple[list[tuple[int, int]], int]:
-    """The rows of the checksums that are wrong, and the last row that has a checksum."""
-    wrong: list[tuple[int, int]] = []
+def _compared(database: sqlite3.Connection) -> tuple[list[tuple[int, int, bool]], int]:
+    """First and last row of the checksums that are wrong, with whether all rows are there; and the last row that has a checksum."""
+    wrong: list[tuple[int, int, bool]] = []
     before = 0
-    for last, stated in database.execute("SELECT last_id, crc32 FROM checksums ORDER BY last_id"):
+    query = "SELECT topic_id, timestamp, data FROM messages WHERE id > ? AND id <= ? ORDER BY id"
+    for last, stated in database.execute("SELECT last_id, crc32 FROM checksums ORDER BY last_id").fetchall():
         summed, count = 0, 0
-        rows = "SELECT topic_id, timestamp, data FROM messages WHERE id > ? AND id <= ? ORDER BY id"
-        for topic, time, data in database.execute(rows, (before, last)):
-            summed, count = checksum(topic, time, data, summed), count + 1
+        try:
+            for topic, time, data in database.execute(query, (before, last)):
+                summed, count = checksum(topic, time, data, summed), count + 1
+        except sqlite3.DatabaseError:  # a broken page
+            count = 0
         if summed != stated or count != last - before:
-            wrong.append((before + 1, last))
+            wrong.append((before + 1, last, count == last - before))
         before = last
     return wrong, before

@@ -88,7 +88,7 @@ class SqliteReader:
             database.execute(
                 "PRAGMA trusted_schema = OFF"
             )  # no function with side effects, in case the schema calls one
-            if self._intact and not self.truncated:
+            if self._intact:
                 self._wrong = wrong_messages(database)
             numbered = _topics(database)
             self.topics = {topic.name: topic for topic in numbered.values()}
