@@ -121,8 +121,12 @@ def test_size_rate_and_power_hold_whoever_commands_and_the_rest_of_a_step_follow
         np.array([getattr(state, field)[0] for state in states]) for field in ("effort", "velocity")
     )
     assert effort.max() > 0.05 and int(node.figures()["limited_commands"]) > 500
-    assert np.abs(effort).max() <= 2.0 and np.diff(effort).max() <= 10.0 * 1e-3 * (1.0 + 1e-9)
+    # on a busy machine the queue of this listener overflows while the plant catches up
+    stamps = np.array([state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec for state in states])
+    steps = np.round(np.diff(stamps) * 1e3)
+    assert np.abs(effort).max() <= 2.0 and np.all(np.diff(effort) <= 10.0 * 1e-3 * steps * (1.0 + 1e-9))
     power = np.minimum(np.abs(effort[2:] * velocity[1:-1]), np.abs(effort[2:] * velocity[:-2]))
+    power = power[(steps[1:] == 1.0) & (steps[:-1] == 1.0)]
     assert power.max() <= POWER * (1.0 + 1e-9) and power.max() > 0.9 * POWER
 
 
