@@ -174,11 +174,12 @@ class Model:
         """Period of the effect of each element's parameter, by name; infinite where it is not periodic."""
         return {f"{t.label}.{p.name}": p.turn for t in self.terms for p in t.element.parameters}
 
-    def unwound(self) -> "Model":
-        """An equivalent copy whose free phases lie within half a turn of zero."""
+    def unwound(self, about: "Model | None" = None) -> "Model":
+        """An equivalent copy whose free phases lie within half a turn of those of `about`, or of zero."""
         turns = self.turns
+        middle = {name: about.value(name) if about else 0.0 for name in self.free if name in turns}
         return self.with_values(
-            {name: math.remainder(self.value(name), turns[name]) for name in self.free if name in turns}
+            {name: at + math.remainder(self.value(name) - at, turns[name]) for name, at in middle.items()}
         )
 
     def with_element(

@@ -215,6 +215,13 @@ def test_a_phase_is_told_within_half_a_turn_and_the_effect_is_the_same(name, par
     assert element.kernel(*ahead, *wound) == pytest.approx(element.kernel(*ahead, *others))
 
 
+def test_the_angle_at_which_a_pendulum_hangs_is_told_in_the_turn_in_which_it_was_given():
+    values = {"moment": 2.0, "reference": 2.9}
+    given = hopper().with_element(CATALOGUE["pendulum_gravity"], values)
+    wound = given.with_values({"pendulum_gravity.reference": 3.3 + 6.0 * np.pi})
+    assert wound.unwound(given).value("pendulum_gravity.reference") == pytest.approx(3.3)
+
+
 def test_what_is_no_phase_or_is_known_is_not_unwound():
     values = {"amplitude": 9.0, "wavelength": 8.0, "phase": 7.0}
     known = hopper().with_element(CATALOGUE["position_ripple"], values, fixed=True)

@@ -115,6 +115,7 @@ def minimise(
         names,
         noise,
         pool,
+        model,
     )
     edge = on_the_edge(fit.model, names, fit.covariance)
     if edge:
@@ -137,12 +138,17 @@ def minimise(
             # e.g. without inertia: a value far from its bound, but undetermined together with others
             return fit
         if end.chi2 < fit.chi2 + FALSE_EDGE:
-            return _fit(end, run, names, noise, pool)
+            return _fit(end, run, names, noise, pool, model)
     return fit
 
 
 def _fit(
-    end: Descent, run: FreeRun, names: Sequence[str], noise: NoiseModel, pool: ThreadPoolExecutor | None
+    end: Descent,
+    run: FreeRun,
+    names: Sequence[str],
+    noise: NoiseModel,
+    pool: ThreadPoolExecutor | None,
+    began: Model,
 ) -> Fit:
     linearisation = end.linearisation
     if linearisation is None or ill_conditioned(linearisation.jacobian):
@@ -151,7 +157,7 @@ def _fit(
         if linearisation is None:
             linearisation, *_ = problem.linearise(end.model, end.starts, end.residuals, *end.differences)
         linearisation = with_ill_conditioned_directions(linearisation, problem, end.model, end.starts)
-    model = end.model.unwound()
+    model = end.model.unwound(began)
     return Fit(
         model=model,
         names=tuple(names),

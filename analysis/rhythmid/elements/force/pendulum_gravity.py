@@ -34,7 +34,7 @@ ELEMENT = Element(
     equation="F = −G sin(x − x_r),  G = m g l",
     parameters=(
         Parameter("moment", "N", "torque amplitude G = m g l", bounds=(0.0, math.inf)),
-        Parameter("reference", "m", "angle x_r at which it hangs at rest", default=0.0),
+        Parameter("reference", "m", "angle x_r at which it hangs at rest", default=0.0, turn=2.0 * math.pi),
     ),
     kernel=kernel,
     acts="body",
