@@ -16,6 +16,7 @@ from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.case import SEARCHED, Budget, Untried
 from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
+from rhythmid.diagnose.search.parts import in_parts
 from rhythmid.diagnose.search.proposals import (
     REFITTED,
     WORTH,
@@ -267,6 +268,9 @@ def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
         found, failed = better_of([*found, *others]), failed + lost
     # a richer model with a worse fit has ended in a bad minimum
     found = [one for one in found if one.chi2 < here.chi2]
+    if parts := list(in_parts(here, now, found)):
+        others, lost = run_trials(parts, *begun, tell=task.tell)
+        found, failed = better_of([*found, *(one for one in others if one.chi2 < here.chi2)]), failed + lost
     return state.without(failed).with_trials(found), found
 
 
