@@ -81,7 +81,7 @@ OPEN = 0.3
 VAGUE = 0.2
 VAGUENESS = 3.0
 # prior odds of a family on real machines, relative to the proof, which draws all effects equally often; those of other families
-# are one. First runs on recordings of real machines stated 28 names of friction (docs/real.md), of which 26 were accepted: odds of
+# are one. Of the first 28 names of friction that runs on recordings of real machines stated (docs/real.md), 26 were accepted: odds of
 # 13, where the sealed cases from which `HOLDS` comes have 5
 PRIOR_ODDS = {"friction": 3.0}
 # smallest detectable effect, as a share of the measurement, from which the records decide nothing: as large as the error that
