@@ -8,7 +8,8 @@ from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.bound import cramer_rao
 from rhythmid.identify.identifiability import delays_of
 from rhythmid.identify.inner_delays import unnoticed
-from rhythmid.identify.joint import JointFit, Search, fit_from
+from rhythmid.identify.joint import JointFit, fit_from, joint_likelihood
+from rhythmid.identify.search_quality import Search
 from rhythmid.ltp.pumping import pumping_of
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
@@ -25,6 +26,17 @@ force:
   - linear_spring: {{stiffness: {{value: 200.0, unit: N/m}}, rest_length: {{value: 0.0, unit: m, fixed: true}}}}
   - viscous_damper: {{damping: {{value: 3.0, unit: N*s/m}}}}
 sensor: [{{measurement_delay: {{delay: {{value: 0.03, unit: s}}}}}}]
+"""
+LATE_SERVO = """
+inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
+command:
+  - input_delay: {delay: {value: 0.0254, unit: s}}
+  - position_control: {proportional: {value: 77.0, unit: N/m, fixed: true}, derivative: {value: 10.5, unit: N*s/m, fixed: true}}
+  - feedback_delay: {delay: {value: 0.0129, unit: s}}
+force:
+  - linear_spring: {stiffness: {value: 12.7, unit: N/m}, rest_length: {value: 0.0, unit: m, fixed: true}}
+  - viscous_damper: {damping: {value: 1.5, unit: N*s/m}}
+sensor: [{measurement_delay: {delay: {value: 0.0, unit: s, fixed: true}}}]
 """
 CONTROLLER = "  - position_control: {proportional: {value: 300.0, fixed: true}, derivative: {value: 14.0, fixed: true}}"
 TIME = np.arange(0.0, 5.0, 5e-3)
@@ -109,3 +121,24 @@ def test_two_dead_times_in_one_loop_show_their_sum():
         "only the sum of feedback_delay with actuator_delay is identifiable"
     )
     assert delays.input.value == pytest.approx(0.02, abs=4.0 * delays.input.std)
+
+
+def test_a_late_feedback_is_found_from_values_that_know_of_no_delay():
+    """From zero delays a search used to end where damping and a far longer dead time stand in for the true ones."""
+    machine = Model.from_text(LATE_SERVO, catalogue=CATALOGUE)
+    time = np.arange(0.0, 10.0, 5e-3)
+    tones = 1.4 * np.geomspace(0.1, 1.6, 8)
+    asked = 0.1 * np.cos(2.0 * np.pi * np.multiply.outer(time, tones) + np.arange(8.0) ** 2).sum(axis=1)
+    run = simulate(machine, time, zero_order_hold(time, asked), max_step=1e-3)
+    noise = 2e-3 * float(np.std(run.output))
+    measured = run.output + noise * np.random.default_rng(3).standard_normal(len(time))
+    record = Record("servo", Channel(time, measured, "m"), Channel(time, asked, "m"), input_kind="reference")
+    ignorant = machine.with_values(
+        {"feedback_delay.delay": 0.0, "input_delay.delay": 0.0, "measurement_delay.delay": 0.0, "linear_spring.stiffness": 16.0,
+         "viscous_damper.damping": 1.9}
+    )  # fmt: skip
+    found = joint_likelihood(record, ignorant)
+    told = delays_of(found, None).inner["feedback_delay"].delay
+    bound = cramer_rao(machine, record, noise).std["feedback_delay.delay"]
+    assert told.value is not None and told.std is not None
+    assert abs(told.value - 0.0129) < 4.0 * bound and told.std < 1.3 * bound

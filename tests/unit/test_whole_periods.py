@@ -7,6 +7,7 @@ import pytest
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify import joint
+from rhythmid.identify.search_quality import explained
 from rhythmid.model import Model
 from rhythmid.record.load import load
 
@@ -43,7 +44,7 @@ def late_fit(folder: Path, command: np.ndarray, delay: float, begun: float) -> j
     model = Model.load(folder / "model.yaml").with_element(load_catalogue()["input_delay"], {"delay": begun})
     fit = joint.fit_from(model, record)
     assert fit.model.value(LATE) == pytest.approx(begun, abs=0.02)
-    return joint.JointFit(fit, None, joint.explained(fit, None), (record,))
+    return joint.JointFit(fit, None, explained(fit, None), (record,))
 
 
 def test_of_delays_that_are_whole_periods_apart_the_shortest_is_told(tmp_path):

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment, Noise
-from rhythmid.identify.joint import cycle_columns, prepared_model
+from rhythmid.identify.joint import prepared_model
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise, start_only
+from rhythmid.identify.search_quality import cycle_columns
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.offline_run import perform

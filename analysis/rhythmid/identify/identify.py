@@ -24,7 +24,7 @@ from rhythmid.identify.held_out import admitted_unseen, held_out_runs
 from rhythmid.identify.identifiability import Forcing, Offset, delays_of, of_told_sum
 from rhythmid.identify.identification import Delays, Estimate, Identification, Shown
 from rhythmid.identify.inner_delays import dead_times
-from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit, explained
+from rhythmid.identify.joint import JointFit, best_fit
 from rhythmid.identify.large_shifts import AGREES, large_shifts, tells_nothing
 from rhythmid.identify.moving import moving
 from rhythmid.identify.natural_size import are_told
@@ -36,6 +36,7 @@ from rhythmid.identify.paper_delays import combined, paper_delays
 from rhythmid.identify.paper_quality import MISFIT, cycle_nrmse, notes_of, quality_of
 from rhythmid.identify.plausibility import SHIFTED, check_plausible, shift
 from rhythmid.identify.record_zero import without_record_zero
+from rhythmid.identify.search_quality import POOR_MOTION, explained
 from rhythmid.identify.timing import compensated, measurement_jitter
 from rhythmid.identify.weighting import efficient_fit
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimates

@@ -12,22 +12,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.identify.dead_times import dead_times
 from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.identification import Delays, Estimate, InnerDelay
 from rhythmid.identify.output_error import Fit
 from rhythmid.identify.undetermined import sum_beside, sum_of
-from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 OPPOSITE = 0.05  # share of a direction's largest step within which steps count as cancelling
 # share of the delays' largest sensitivity below which the rest of a direction is an error of integration and differences
 UNNOTICED = 5e-3
 UNKNOWN = Estimate(None, None, "s")
-
-
-def dead_times(model: Model) -> dict[str, str]:
-    """Parameters that are dead times inside the machine, with their elements' labels."""
-    return {f"{t.label}.{t.element.dead_time}": t.label for t in model.terms if t.element.history}
 
 
 def with_inner_delays(found: Delays, fit: Fit) -> Delays:

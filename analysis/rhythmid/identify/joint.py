@@ -6,7 +6,7 @@ start that does not depend on the model's values (the harmonic likelihood, which
 them all), the choice of the data to use, and the test whether the search converged to the right optimum.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.dead_times import dead_times, with_dead_times
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.early_output import EARLIEST
 from rhythmid.identify.harmonic_likelihood import (
@@ -26,6 +27,7 @@ from rhythmid.identify.harmonic_likelihood import (
 from rhythmid.identify.initial_step import value_before
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
+from rhythmid.identify.search_quality import NOISE_ALONE, Search, cycle_columns, explained
 from rhythmid.identify.series import Series, dominant_frequency, prepare
 from rhythmid.ltp.pumping import Pumping, active_pumping, pumping_of
 from rhythmid.model import Model
@@ -33,10 +35,9 @@ from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-STUCK = 0.5  # unexplained share (rms) of the response to the command above which a fit is rejected
-# unexplained share (rms) of the whole motion above which the model counts as not identified
-POOR_MOTION = 0.2
-CYCLE_HARMONICS = 24  # number that is projected out where the limit cycle is not used
+MARGIN = (
+    0.05  # [s] of a signal that is known before the first sample, beyond the delays that a fit begins with
+)
 STEP, FINE_STEP = (
     0.2,
     0.05,
@@ -45,26 +46,6 @@ STEP, FINE_STEP = (
 # later, except at its start
 LATER_PERIOD = 0.7
 NO_PUMPING = Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none")
-
-
-@dataclass(frozen=True)
-class Search:
-    """Quality of a fit: unexplained shares (rms) of the whole motion and of the response to the command, and the
-    ratio of residual to noise floor. `arrived` is False where the search is stuck or the model does not fit."""
-
-    motion: float
-    response: float
-    over_noise: float
-
-    @property
-    def arrived(self) -> bool:
-        return self.motion < POOR_MOTION and (self.response < STUCK or self.over_noise < 2.0)
-
-    def __str__(self) -> str:
-        return (
-            f"the fit leaves {self.motion:.1%} of the motion and {self.response:.0%} of the response to the command "
-            f"unexplained, {self.over_noise:.3g} times the noise floor"
-        )
 
 
 @dataclass(frozen=True)
@@ -146,39 +127,6 @@ def _begun(record: Record, delay: float) -> Record:
     return replace(record, output=replace(output, time=output.time[first:], value=output.value[first:]))
 
 
-def cycle_columns(series: Series, pumping: Pumping) -> Array:
-    """Mean and harmonics of the limit cycle at the blocks' centres, as columns."""
-    highest = int(0.5 / (series.period * series.block * pumping.frequency)) - 1
-    n = np.arange(1, max(1, min(CYCLE_HARMONICS, highest)) + 1)
-    angle = np.multiply.outer(pumping.omega * series.centres, n)
-    return np.hstack([np.ones((len(angle), 1)), np.cos(angle), np.sin(angle)])
-
-
-def explained(fit: Fit, pumping: Pumping | None) -> Search:
-    """Compare the residuals of the fit with the motion, with the response to the command and with the noise."""
-    left = response = floor = count = 0.0
-    for one, residual in zip(fit.run.series, fit.residuals):
-        used = one.used
-        columns = np.ones((one.blocks, 1)) if pumping is None else cycle_columns(one, pumping)
-        measured = one.averaged
-        if one.ignored is not None:
-            residual = residual - columns @ np.linalg.lstsq(columns[used], residual[used], rcond=1e-12)[0]
-        moved = measured - columns @ np.linalg.lstsq(columns[used], measured[used], rcond=1e-12)[0]
-        left += float(np.sum(residual[used] ** 2))
-        response += float(np.sum(moved[used] ** 2))
-        power = np.abs(np.fft.rfft(moved * np.hanning(len(moved)))) ** 2
-        high = power[int(0.6 * len(power)) :]
-        floor += float(np.mean(high)) * 2.0 * len(high) / 0.4 / 0.375 / len(moved)
-        count += float(used.sum())
-    explained = max(response - floor, 1e-300)
-    motion = fit.nrmse() if all(one.ignored is None for one in fit.run.series) else 0.0
-    least = max(floor, 1e-18 * response, 1e-300)
-    unexplained = float(np.sqrt(left / max(explained, 0.01 * response)))
-    if pumping is not None and not any(one.commanded for one in fit.run.series):
-        unexplained = 0.0  # no response to a command, only the limit cycle
-    return Search(motion, unexplained, float(np.sqrt(left / least)))
-
-
 def _start(model: Model, records: Sequence[Record], pumping: Pumping | None) -> list[Model]:
     """Models with values from the harmonic likelihood of each record, best first; empty where it cannot be applied."""
     found: list[tuple[float, Model]] = []
@@ -202,6 +150,20 @@ def _start(model: Model, records: Sequence[Record], pumping: Pumping | None) -> 
         if fit.misfit < 0.2:
             break
     return [start for _, start in sorted(found, key=lambda pair: pair[0])]
+
+
+def _starts(
+    model: Model,
+    records: Sequence[Record],
+    stretches: Sequence[Record],
+    late: Sequence[str],
+    pumping: Pumping | None,
+) -> Iterator[Model]:
+    """Models to begin with: first, where dead times `late` inside the machine are to be found, its own values with several of them."""
+    if late:
+        longest = max(begun_series(stretches, 0.0), key=lambda one: one.blocks)
+        yield from with_dead_times(model, late, 2.0 * np.pi * dominant_frequency(longest))
+    yield from _start(model, records, pumping)
 
 
 def _search_in_time(model: Model, series: Sequence[Series]) -> Fit:
@@ -309,14 +271,12 @@ def _best_fit(records: Record | Sequence[Record], model: Model) -> JointFit:
     if not given:
         raise InputError("nothing to identify from: give at least one record")
     model, pumping = prepared_model(with_declared(model, given), given)
-    starts = _start(model, given, pumping)
-    given = stretches_of(given)
+    uncut, given = given, stretches_of(given)
+    late = [name for name in dead_times(model) if name in model.free]
     best: JointFit | None = None
-    for start in starts:
-        late = late_by(start)
+    for start in _starts(model, uncut, given, late, pumping):
         try:
-            series = begun_series(given, late)
-            trial = _judged(estimate(start, series, max_step=step_of(series)), pumping, given)
+            trial = _judged(_estimated(start, given), pumping, given)
         except InputError:
             continue
         if (
@@ -324,13 +284,26 @@ def _best_fit(records: Record | Sequence[Record], model: Model) -> JointFit:
             or trial.search.motion + trial.search.response < best.search.motion + best.search.response
         ):
             best = trial
-        if trial.search.arrived:
+        if trial.search.arrived and (not late or trial.search.over_noise < NOISE_ALONE):
             return trial
+    if best is not None and best.search.arrived:
+        return best
     series = begun_series(given, 0.0 if pumping is None else 0.2)
     trial = _judged(_search_in_time(model, series), pumping, given)
     if trial.search.arrived or best is None or trial.search.motion < best.search.motion:
         return trial
     return best
+
+
+def _estimated(start: Model, records: Sequence[Record]) -> Fit:
+    """The fit from these values. The records begin where command and forcing are known as far back as the delays reach;
+    where the fit's delays are longer than those it began with, it is repeated from there."""
+    series = begun_series(records, late_by(start))
+    fit = estimate(start, series, max_step=step_of(series))
+    if late_by(fit.model) <= _known_back(late_by(start)):
+        return fit
+    series = begun_series(records, late_by(fit.model))
+    return estimate(fit.model, series, max_step=step_of(series))
 
 
 def fit_from(model: Model, records: Record | Sequence[Record], cycle: bool = True) -> Fit:
@@ -374,12 +347,18 @@ def stretches_of(records: Sequence[Record]) -> tuple[Record, ...]:
 
 def late_by(model: Model) -> float:
     """Time [s] between a command and the measurement of its effect, by a model's delays."""
-    return sum(max(model.value(name), 0.0) for name in DELAYS if name in model.parameters)
+    names = [*(name for name in DELAYS if name in model.parameters), *dead_times(model)]
+    return sum(max(model.value(name), 0.0) for name in names)
 
 
 def begun_series(records: Sequence[Record], delay: float, block: int | None = None) -> list[Series]:
     """Series of the records from the time at which signals are known `delay` [s] back; `block` as for `prepare`."""
-    return prepare([_begun(record, delay + 0.05 if delay > 0.0 else 0.0) for record in records], block)
+    return prepare([_begun(record, _known_back(delay)) for record in records], block)
+
+
+def _known_back(delay: float) -> float:
+    """Time [s] before the first sample of a series for which signals are known, by the delays that it was begun with."""
+    return delay + MARGIN if delay > 0.0 else 0.0
 
 
 def _judged(fit: Fit, pumping: Pumping | None, records: Sequence[Record]) -> JointFit:

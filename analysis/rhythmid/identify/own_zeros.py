@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
-from rhythmid.identify.joint import JointFit, explained
+from rhythmid.identify.joint import JointFit
 from rhythmid.identify.least_squares import column_norms
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate, minimise
 from rhythmid.identify.record_zero import others_marked, with_record_zero
 from rhythmid.identify.robust_covariance import widening
+from rhythmid.identify.search_quality import explained
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.series import record_of
 from rhythmid.identify.timing import EVIDENT_BY

@@ -27,8 +27,9 @@ from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.descent import WHITE
 from rhythmid.identify.free_run import with_series
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.joint import POOR_MOTION, Search, explained, prepared_model
+from rhythmid.identify.joint import prepared_model
 from rhythmid.identify.output_error import Fit, estimate
+from rhythmid.identify.search_quality import POOR_MOTION, Search, explained
 from rhythmid.identify.series import Series, dominant_frequency, prepare
 from rhythmid.model import INERTIA, Model
 from rhythmid.record.record import Record

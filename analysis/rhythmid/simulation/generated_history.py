@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from rhythmid.simulation.history import SIGNALS
 
+POSITION = 0  # index of the position among the states; that of its velocity is 1
+
 PADE = 4  # order of the Padé approximation of a dead time
 FEWEST_STEPS_OF_DELAY = 4.0  # least number of integration steps in the dead time of this approximation
 
@@ -144,7 +146,7 @@ class HistoryLines:
         self, states: int, memories: list[int], find: list[str], inputs: dict[str, list[str]], call: str
     ) -> list[str]:
         """The past of a run without a given history: command and forcing are known; the states are extrapolated
-        back along their rates.
+        back along their rates, the position (z0) also along the rate of its velocity (z1).
 
         `call` evaluates the right-hand side at the states `z0`, `z1`, … and the time `at`.
         """
@@ -158,7 +160,10 @@ class HistoryLines:
                 *inputs[at],
                 f"at = {at}",
                 *(
-                    f"z{i} = s{i}" if i in memories else f"z{i} = s{i} + (at - times[0]) * e{i}"
+                    f"z{i} = s{i}"
+                    if i in memories
+                    else f"z{i} = s{i} + (at - times[0]) * e{i}"
+                    + (" + 0.5 * (at - times[0]) ** 2 * e1" if i == POSITION else "")
                     for i in range(states)
                 ),
                 call,

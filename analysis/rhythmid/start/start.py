@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
-from rhythmid.record.angle_wrap import unwrapped, wraps_of
+from rhythmid.record.angle_wrap import wraps_of
 from rhythmid.record.braking import WHY as TAKES_ENERGY
 from rhythmid.record.braking import braking_roles
 from rhythmid.record.cleaning import cleaned
@@ -333,9 +333,9 @@ def _doubted_of(roles: Roles, told: Sequence[str], doubt: str) -> Roles:
 
 def _nominal(sources: Sequence[str | Path], signals: str, roles: Roles, catalogue: Catalogue) -> Nominal:
     """The nominal model of recordings with these roles, of those in which the machine moves."""
-    records = load_records(sources, Signals.from_text(signals, GUESSED))
-    records = [one for one in records if standstill(cleaned(one).record) is None] or records
-    return nominal_of([unwrapped(one) for one in records], roles, _units(roles), catalogue)
+    records = [cleaned(one).record for one in load_records(sources, Signals.from_text(signals, GUESSED))]
+    records = [one for one in records if standstill(one) is None] or records
+    return nominal_of(records, roles, _units(roles), catalogue)
 
 
 def _units(roles: Roles) -> Units:

@@ -19,7 +19,6 @@ from rhythmid.body.machine import Machine
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, size_of
-from rhythmid.identify.joint import POOR_MOTION
 from rhythmid.identify.joints.adopted_inertia import adopted_inertia
 from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_inertia
 from rhythmid.identify.joints.correlation import Correlations
@@ -29,6 +28,7 @@ from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_plausibility import check_joints
 from rhythmid.identify.joints.output_error import Knowledge, free_runs, refine
 from rhythmid.identify.joints.reference_delay import ReferenceDelay, fit_with_delay, reference_delay
+from rhythmid.identify.search_quality import POOR_MOTION
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints

@@ -17,11 +17,11 @@ import numpy as np
 from rhythmid.body.machine import Machine
 from rhythmid.errors import InputError
 from rhythmid.identify.channel_change import DEGREE, NAMED, UNITS
-from rhythmid.identify.joint import POOR_MOTION
 from rhythmid.identify.joints.joint_reading import Balanced, Reading, RecordedMotion, mean_left
 from rhythmid.identify.joints.mounting import likely_mounting
 from rhythmid.identify.joints.reference_unit import reference_mend
 from rhythmid.identify.plausibility import BETTER_UNIT, LEAST_UNIT_FACTOR
+from rhythmid.identify.search_quality import POOR_MOTION
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.report.quantity import number
 
