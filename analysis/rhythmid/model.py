@@ -176,7 +176,7 @@ class Model:
 
     def unwound(self, about: "Model | None" = None) -> "Model":
         """An equivalent copy whose free phases lie within half a turn of those of `about`, or of zero."""
-        turns = self.turns
+        turns = {name: turn for name, turn in self.turns.items() if math.isfinite(turn)}
         middle = {name: about.value(name) if about else 0.0 for name in self.free if name in turns}
         return self.with_values(
             {name: at + math.remainder(self.value(name) - at, turns[name]) for name, at in middle.items()}

@@ -224,3 +224,23 @@ def test_an_angle_at_rest_that_the_start_of_a_speed_makes_up_for_stays_where_it_
     assert fit.model.value("pendulum_gravity.moment") == pytest.approx(0.1, rel=0.01)
     assert fit.model.value("pendulum_gravity.reference") == pytest.approx(0.2, abs=0.05)
     assert fit.std["pendulum_gravity.reference"] > 1e6
+
+
+@pytest.mark.parametrize("turns", [0, 3])
+def test_a_pendulum_is_told_to_hang_in_the_turn_in_which_it_was_given(turns):
+    time, state, angle = 0.01 * np.arange(600), np.array([0.9, 0.0]), []
+    for _ in time:
+        angle.append(state[0])
+        for _ in range(10):
+            state = state + 1e-3 * np.array([state[1], -20.0 * np.sin(state[0]) - 0.1 * state[1]])
+    text = """
+units: {force: rad/s^2, position: rad, mass: "1"}
+inertia: {mass: {value: 1.0, fixed: true}}
+force:
+  - pendulum_gravity: {moment: {value: 21.0}, reference: {value: 0.1}}
+  - viscous_damper: {damping: {value: 0.1}}
+"""
+    given = 0.1 + 2.0 * np.pi * turns
+    model = Model.from_text(text, catalogue=CATALOGUE).with_values({"pendulum_gravity.reference": given})
+    fit = estimate(model, prepare([Record("swing", Channel(time, np.array(angle), "rad"))]))
+    assert fit.model.value("pendulum_gravity.reference") == pytest.approx(2.0 * np.pi * turns, abs=0.02)

@@ -321,6 +321,7 @@ def descend(
     The search stops in three cases. A further step lowers chi2, or is predicted to lower it, by less than
     `tolerance` (less where the noise model proves too wide) or by less than 1e-7 of chi2. Or chi2 would not come
     down to `reach` in the iterations left, at the rate of the last `PACE` iterations. Or a deadline passes.
+    A phase is told within half a turn of its value at the start.
     `differences` are finite-difference steps known from another descent of the same structure. Without them the
     steps of a `similar` descent are taken, by name of parameter or state, and the missing ones are computed. Raises
     InputError when the model diverges at its initial values.
@@ -358,7 +359,7 @@ def descend(
             break
     white = [problem.whitened(i, r) for i, r in enumerate(point.residuals)]
     return Descent(
-        model=point.model,
+        model=point.model.unwound(model),
         starts=tuple(point.starts),
         residuals=tuple(point.residuals),
         chi2=float(sum(np.sum(w**2) for w in white)),
