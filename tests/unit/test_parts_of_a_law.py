@@ -5,7 +5,12 @@ import pytest
 
 from machines import CATALOGUE
 from rhythmid.diagnose.diagnosis import diagnose
+from rhythmid.diagnose.search.parts import in_parts
+from rhythmid.diagnose.search.round import Round
+from rhythmid.diagnose.search.score_tests import Score
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.elements.catalogue import Catalogue
+from rhythmid.identify.noise import NoiseModel
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
@@ -53,3 +58,35 @@ def test_a_friction_and_a_larger_constant_force_are_told_as_both_and_with_a_smal
     sizes = {one.element: one.parameters["force"].value for one in answer.missing}
     if "constant_force" in names:
         assert sizes == pytest.approx({"coulomb_friction": 0.07, "constant_force": offset}, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("asymmetry", "scored", "parts"),
+    [
+        (1.0, LAWS[1:], ("constant_force", "coulomb_friction")), (0.6, LAWS[1:], ()),
+        (-1.0, LAWS[1:2], ()),  # a constant force is in the model, or a rest length does the same
+    ],
+)  # fmt: skip
+def test_parts_are_refitted_from_their_sizes_where_a_law_ends_and_all_of_them_are_candidates(
+    asymmetry, scored, parts
+):
+    model = Model.from_text(MODEL, catalogue=CATALOGUE)
+    law = model.with_element(CATALOGUE[LAWS[0]], {"force": 0.08, "asymmetry": asymmetry, "transition": 0.3})
+    quiet = NoiseModel(np.empty(0), 1.0)
+    here = Trial((), model, (), 1e4, 2000, 2, True, quiet)
+    ended = Trial(LAWS[:1], law.with_values({"viscous_damper.damping": 2e-4}), (), 1e3, 2000, 5, True, quiet)
+    values = {"force": 0.02, "transition": 1.0}
+    scores = [
+        Score(CATALOGUE[name], {p.name: values[p.name] for p in CATALOGUE[name].parameters}, 9.0, 1.0)
+        for name in scored
+    ]
+    made = list(in_parts(here, Round(tuple(scores), 0.0), [ended]))
+    assert [one.added for one in made] == ([parts] if parts else [])
+    for one in made:
+        assert one.model.value("constant_force.force") == pytest.approx(-0.08)
+        begun = {
+            "coulomb_friction.force": 0.08,
+            "coulomb_friction.transition": 0.3,
+            "viscous_damper.damping": 2e-4,
+        }
+        assert begun.items() <= dict(one.guesses[0]).items()
