@@ -155,6 +155,21 @@ def test_a_rounded_speed_that_drops_a_count_now_and_then_is_no_clipping(seed):
 
 
 @given(seed=seeds)
+def test_a_single_clipped_peak_is_seen_in_a_motion_that_also_sticks(seed):
+    """Friction holds the machine elsewhere for as long, but it slows down before."""
+    phase = np.random.default_rng(seed).uniform(0.0, 0.5)
+    swing = 1.4 * np.sin(np.linspace(0.0, np.pi, 200)[1:]) - 0.1 * phase
+    slowing = -0.5 * (1.0 - np.exp(-np.arange(150) / 12.0)) + swing[-1]
+    value = (
+        np.round(
+            np.concatenate([np.clip(swing, -9.0, 1.0), slowing, slowing[-1] - 0.02 * np.arange(30)]) / 0.002
+        )
+        * 0.002
+    )
+    assert clipped(value) == np.count_nonzero(value == value.max())
+
+
+@given(seed=seeds)
 def test_a_machine_that_rests_on_many_levels_is_not_clipped_on_its_outermost_ones(seed):
     rng = np.random.default_rng(seed)
     levels = np.round(rng.uniform(0.0, 10.0, 12), 5)

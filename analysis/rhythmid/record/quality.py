@@ -1,7 +1,7 @@
 """Data quality of a record: properties that affect the reliability of results identified from it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -212,29 +212,51 @@ def _at_limit(value: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _rests(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
-    """Whether a signal (n,) keeps values between its extremes as often as in these runs and for about as long.
-    Values before its first and after its last move are ignored, because any signal rests there."""
+    """Whether a signal (n,) keeps values between its extremes as often as in these runs, for about as long, and as suddenly:
+    a machine that sticks by friction slows down before. Values before its first and after its last move are ignored,
+    because any signal rests there."""
     changes = np.flatnonzero(np.diff(value)) + 1
     lengths, level = np.diff(changes), value[changes[:-1]]
     about = 0.5 * float(np.median([end - begin for begin, end in runs]))
-    between = (level > value.min()) & (level < value.max())
-    return int(np.sum((lengths >= about) & between)) >= len(runs)
+    between = (lengths >= about) & (level > value.min()) & (level < value.max())
+    rests = [
+        (int(begin), int(begin + length)) for begin, length in zip(changes[:-1][between], lengths[between])
+    ]
+    return len(rests) >= len(runs) and sum(map(_at_speed(value), rests)) >= len(runs)
 
 
 def _moving(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
-    """Whether a signal (n,) both enters and leaves its plateaus at speed, as a clipped signal does.
-
-    At speed means that it moves in two steps in a row. A limit knows nothing of the motion, so a signal that it cuts
-    is under way before and goes on after. A machine that comes to rest by friction slows down, one that hits a stop
-    starts from rest, and a jump from one rest to another is over in as long as it takes to see it.
-    """
-    step = np.abs(np.diff(value))
-    moves = step[step > 0.0]
-    if len(moves) == 0:
+    """Whether a signal (n,) both enters and leaves its plateaus at speed, as a clipped signal does."""
+    if not np.diff(value).any():
         return False
-    usual = float(np.sqrt(np.mean(moves**2)))
-    # without the steps into and out of the plateau, which the limit itself shortens
-    entries = [min(step[begin - 3], step[begin - 2]) for begin, _ in runs if begin >= 3]
-    exits = [min(step[end], step[end + 1]) for _, end in runs if end + 1 < len(step)]
-    least = max(MOVING * usual, 1.5 * resolution(value))  # a step of a rounded value may be a slow drift
+    speeds = [_speeds(np.abs(np.diff(value)), run) for run in runs]
+    entries, exits = ([one[side] for one in speeds if one[side] is not None] for side in (0, 1))
+    least = _least_speed(value)
     return all(ends and float(np.median(ends)) > least for ends in (entries, exits))
+
+
+def _at_speed(value: NDArray[np.float64]) -> Callable[[tuple[int, int]], bool]:
+    """Whether a run of a signal (n,) is entered and left at speed, by its first sample and the one after its last."""
+    step, least = np.abs(np.diff(value)), _least_speed(value)
+    return lambda run: all(speed is not None and speed > least for speed in _speeds(step, run))
+
+
+def _speeds(step: NDArray[np.float64], run: tuple[int, int]) -> tuple[float | None, float | None]:
+    """Smaller of the two steps (n - 1,) before and after a run, without those into and out of it, which a limit
+    shortens; None at an end of the signal.
+
+    Two steps in a row are a motion: a limit knows nothing of it, so a signal that it cuts is under way before and goes
+    on after. A machine that comes to rest by friction slows down, one that hits a stop starts from rest, and a jump from
+    one rest to another is over in as long as it takes to see it.
+    """
+    begin, end = run
+    before = float(min(step[begin - 3], step[begin - 2])) if begin >= 3 else None
+    after = float(min(step[end], step[end + 1])) if end + 1 < len(step) else None
+    return before, after
+
+
+def _least_speed(value: NDArray[np.float64]) -> float:
+    """Step from which on a signal (n,) moves at speed; one of a rounded value may be a slow drift."""
+    moves = np.diff(value)
+    usual = float(np.sqrt(np.mean(moves[moves != 0.0] ** 2)))
+    return max(MOVING * usual, 1.5 * resolution(value))
