@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from rhythmid.diagnose.answer.command_twins import command_twins, with_twins
 from rhythmid.diagnose.answer.compose import explanations, held_out_words, missing_effects, remainder_of
 from rhythmid.diagnose.answer.result import Detection, Diagnosis, Estimate, FitQuality, Scored, settled
 from rhythmid.diagnose.answer.same_while_moving import same_while_moving
@@ -26,6 +27,7 @@ from rhythmid.identify.inverse_dynamics.estimate import variation_of
 from rhythmid.record.separate_zeros import separate_zeros_notes
 
 NO_SENSOR = "The measurement is assumed to be the motion: effects in the sensor and in the measurement's time are not among the candidates."
+SAME_HERE = "it acts on the recorded command, beside which nothing drives, as the actuator's law does"
 FIXED_SCALE = "The recorded effort is taken to be true in scale."
 
 
@@ -48,6 +50,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     slot, evidence = "force" if unknown else None, (result.applicability.reason,)
     # held-out records without an effort cannot judge a hypothesis
     unseen = result.heldout is not None
+    twins = command_twins(case.records, case.nominal, case.catalogue)
     held = held_out_words(case.holdout, "") if unseen else "held out: every block of the records in its turn"
     return Diagnosis(
         verdict=decision.verdict,
@@ -56,7 +59,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         location=location_of(missing, decision.verdict, "effort", evidence, slot, depends),
         missing=missing,
         joint_probability=decision.joint,
-        indistinguishable=decision.equivalent,
+        indistinguishable=with_twins(decision.equivalent, decision.named, twins),
         alternatives=(),
         hypotheses=explanations(result.contest, decision),
         rejections=result.selection.rejections,
@@ -73,7 +76,10 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
             *recalibrated(case.nominal, chosen.fit.model, chosen.std()),
             *delay_told(result.search.balance, chosen, case.nominal),
         ),
-        excluded=tuple(Untried(name, why) for name, why in result.search.not_tried.items()),
+        excluded=tuple(
+            Untried(name, SAME_HERE if name in twins.values() else why)
+            for name, why in result.search.not_tried.items()
+        ),
         heldout=held,
         notes=(
             *notes,
