@@ -230,7 +230,8 @@ def _moving(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
     if not np.diff(value).any():
         return False
     speeds = [_speeds(np.abs(np.diff(value)), run) for run in runs]
-    entries, exits = ([one[side] for one in speeds if one[side] is not None] for side in (0, 1))
+    entries = [before for before, _ in speeds if before is not None]
+    exits = [after for _, after in speeds if after is not None]
     least = _least_speed(value)
     return all(ends and float(np.median(ends)) > least for ends in (entries, exits))
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from rhythmid.diagnose.answer.command_twins import command_twins, with_twins
 from rhythmid.diagnose.answer.compose import explanations, held_out_words, missing_effects, remainder_of
@@ -33,7 +34,11 @@ FIXED_SCALE = "The recorded effort is taken to be true in scale."
 
 def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Diagnosis:
     """The diagnosis."""
-    decision, chosen, nominal = result.decision, result.chosen, result.nominal
+    chosen, nominal = result.chosen, result.nominal
+    twins = command_twins(case.records, case.nominal, case.catalogue)
+    decision = replace(
+        result.decision, equivalent=with_twins(result.decision.equivalent, result.decision.named, twins)
+    )
     size = variation_of(result.search.balance)
     sizes = scales_of(result.search.balance, chosen.fit.model)
     missing = missing_effects(chosen.fit.model, decision, lambda name: _estimate(chosen, name), sizes)
@@ -50,7 +55,6 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     slot, evidence = "force" if unknown else None, (result.applicability.reason,)
     # held-out records without an effort cannot judge a hypothesis
     unseen = result.heldout is not None
-    twins = command_twins(case.records, case.nominal, case.catalogue)
     held = held_out_words(case.holdout, "") if unseen else "held out: every block of the records in its turn"
     return Diagnosis(
         verdict=decision.verdict,
@@ -59,7 +63,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         location=location_of(missing, decision.verdict, "effort", evidence, slot, depends),
         missing=missing,
         joint_probability=decision.joint,
-        indistinguishable=with_twins(decision.equivalent, decision.named, twins),
+        indistinguishable=decision.equivalent,
         alternatives=(),
         hypotheses=explanations(result.contest, decision),
         rejections=result.selection.rejections,
