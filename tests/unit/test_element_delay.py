@@ -42,7 +42,9 @@ def late(name: str, delay: float) -> Model:
 def method_of_steps(name: str, delay: float, reference) -> np.ndarray:
     """Positions at TIME: one stretch after the other, in which everything that is late is known and nothing jumps."""
     rate = GAIN * (reference(0.0) - START[0]) - RATE * START[1] - SPRING * START[0]
-    known = [(-np.inf, 0.0, lambda t: np.array([START[0] + START[1] * t, START[1] + rate * t]))]
+    known = [
+        (-np.inf, 0.0, lambda t: np.array([START[0] + START[1] * t + 0.5 * rate * t**2, START[1] + rate * t]))
+    ]
 
     def earlier(t: float) -> np.ndarray:
         return next(path(t) for begin, end, path in known if t <= end + 1e-12)
