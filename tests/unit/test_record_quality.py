@@ -103,6 +103,24 @@ def test_a_clock_that_was_set_back_is_refused(back):
         put_in_order(time, "output", "split it")
 
 
+@given(seed=seeds)
+def test_rows_that_come_twice_are_put_back_with_those_that_overtook_one_another(seed):
+    rng = np.random.default_rng(seed)
+    rows = np.sort(np.concatenate([np.arange(600), rng.choice(600, 30, replace=False)]))
+    for at in 4 * rng.choice(140, 20, replace=False):
+        rows[at], rows[at + 1] = rows[at + 1], rows[at]
+    kept = put_in_order(rows * 1e-3, "output", "split it")
+    np.testing.assert_array_equal(rows[kept], np.arange(600))
+
+
+@pytest.mark.parametrize("periods", [2, 3, 10])
+def test_a_clock_that_was_set_back_by_whole_periods_is_refused(periods):
+    time = np.arange(300) * 1e-3
+    time[100:] -= periods * 1e-3
+    with pytest.raises(InputError, match="time goes backwards"):
+        put_in_order(np.round(time, 6), "output", "split it")
+
+
 def test_rows_that_are_mixed_up_are_refused_with_another_mend_than_a_clock_that_was_set_back():
     order = np.random.default_rng(0).permutation(300)
     with pytest.raises(
