@@ -1,5 +1,6 @@
 """Runs that a file keeps in structs, cells and groups of their own: they are told, and `rhythmid split` takes them apart."""
 
+import json
 from pathlib import Path
 
 import foreign
@@ -86,3 +87,15 @@ def test_arrays_in_cells_are_columns(tmp_path):
     cells[:] = [np.ones((20, 3)), np.ones((30, 3))]
     savemat(tmp_path / "log.mat", {"data": cells})
     assert len(Table.load(tmp_path / "log.mat").column("data[1][2]")) == 30
+
+
+def test_runs_whose_names_are_paths_are_written_into_the_folder(tmp_path):
+    arrays = [np.column_stack([t, q]).tolist() for t, q in zip(TIME, ANGLE, strict=True)]
+    (tmp_path / "log.json").write_text(json.dumps({"../up/slow": arrays[0], ".. up/slow": arrays[1]}))
+    done = CliRunner().invoke(app, ["split", str(tmp_path / "log.json"), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == [
+        "log_.._up_slow.npz",
+        "log_.._up_slow_1.npz",
+    ]
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["log.json", "out"]

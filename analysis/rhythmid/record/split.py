@@ -24,6 +24,9 @@ from rhythmid.record.table_clock import restarting
 NUMBERED = re.compile(
     r"(?:.*[._ ])?(?:episode|trial|run|trajectory|segment)(?:[._ ]?(?:index|id|number|nr|no))?", re.IGNORECASE
 )
+NOT_IN_A_FILE_NAME = re.compile(
+    r"[^\w.+-]+"
+)  # of the names of columns, which may hold anything, such as `../x`
 MOST_RECORDINGS = 10_000  # largest number of recordings in a table
 Rows = NDArray[np.int64]
 
@@ -104,6 +107,19 @@ def _numbers(columns: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     return {name: values for name, values in arrays.items() if values.dtype.kind in "fiub"}
 
 
+def _as_file_names(names: list[str]) -> list[str]:
+    """Names of recordings as parts of the names of files, all different."""
+    found: list[str] = []
+    for name in names:
+        plain = own = NOT_IN_A_FILE_NAME.sub("_", name)
+        number = 0
+        while own in found:
+            number += 1
+            own = f"{plain}_{number}"
+        found.append(own)
+    return found
+
+
 def _written(
     table: Table, names: list[str], parts: Iterable[Mapping[str, NDArray[Any]]], folder: Path
 ) -> list[Path]:
@@ -112,7 +128,7 @@ def _written(
         raise InputError(f"{folder}: exists already; name another folder or remove it")
     require_writable(folder)
     partial = folder.with_name(f".{folder.name}.partial")
-    made = [f"{table_name(table.path)}_{name}.npz" for name in names]
+    made = [f"{table_name(table.path)}_{name}.npz" for name in _as_file_names(names)]
     try:
         partial.mkdir(parents=True, exist_ok=True)
         for name, columns in zip(made, parts, strict=True):
