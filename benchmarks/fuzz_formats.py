@@ -188,7 +188,8 @@ def _of_simulink(file: Any) -> None:
 
 
 def npys() -> list[bytes]:
-    record = np.rec.fromarrays([np.arange(COUNT) * STEP, VALUES], names=["t", "q"])
+    record = np.zeros(COUNT, dtype=[("t", "f8"), ("q", "f8")])
+    record["t"], record["q"] = np.arange(COUNT) * STEP, VALUES
     arrays = (np.column_stack([np.arange(COUNT) * STEP, VALUES]), record, np.array([{"a": 1}], dtype=object))
     made = []
     for array in arrays:
