@@ -4,9 +4,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from rhythmid.diagnose.answer.compose import missing_effects
 from rhythmid.diagnose.answer.result import Estimate
+from rhythmid.diagnose.joints import joint_compose
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.identify import identify
 from rhythmid.identify.natural_size import are_told
@@ -68,3 +70,25 @@ def test_a_nuisance_that_the_records_do_not_determine_is_given_no_standard_devia
     assert judged(0.005, (0.0, 230.0)) == [0.005, None]
     assert judged(0.005, (0.0, tiny)) == [0.005, tiny]
     assert judged(9e9, (0.2, 0.1)) == [9e9, 0.1]
+
+
+def test_an_effect_at_a_joint_has_no_standard_deviation_either_where_the_records_tell_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    model = MODEL.with_element(load_catalogue()["coulomb_friction"], {"force": 0.08})
+    label, known = "coulomb_friction", scales(prepare([steady(5.0, NOISE[:2], "fast")]), model)
+    monkeypatch.setattr(joint_compose, "scales_of", lambda *_: known)
+    for name in ("_gain", "shared_among", "probability_together"):
+        monkeypatch.setattr(joint_compose, name, lambda *_: 1.0)
+    chosen = SimpleNamespace(fit=SimpleNamespace(model=model))
+    decision = SimpleNamespace(shares={label: 1.0}, probability={label: 1.0})
+    result = SimpleNamespace(decision=decision, chosen=chosen, search=SimpleNamespace(balance=None))
+    one: Any = SimpleNamespace(joint="knee", result=result)
+    answer: Any = SimpleNamespace(
+        parameters={
+            f"{label}.force": Estimate(0.01, 0.005, "N"),
+            f"{label}.transition": Estimate(0.0, 230.0, "m/s"),
+        }
+    )
+    effect = joint_compose._effect(SimpleNamespace(), one, answer, label)  # pyright: ignore[reportPrivateUsage, reportArgumentType]
+    assert [size.std for size in effect.parameters.values()] == [0.005, None]

@@ -54,7 +54,7 @@ from rhythmid.identify.record_scales import scales
 from rhythmid.identify.repeats import noise_from_repeats
 from rhythmid.identify.series import Series
 from rhythmid.identify.zero_estimates import zeros_told
-from rhythmid.model import Model
+from rhythmid.model import Model, Term
 from rhythmid.record.record import Record
 from rhythmid.simulation.transport import INPUT_DELAY
 
@@ -250,11 +250,16 @@ def missing_effects(
             term.element.equation,
             decision.shares[label],
             decision.probability[label],
-            {name: _told(estimate(f"{label}.{name}"), name, term.element, known) for name in term.values},
+            sizes_told(term, estimate, known),
         )
         for label in decision.named
         if (term := model.term(label)) is not None
     )
+
+
+def sizes_told(term: Term, estimate: Callable[[str], Estimate], known: Scales) -> dict[str, Estimate]:
+    """The estimates of an effect's parameters, looked up by the name "label.parameter"; `known` are the scales of the records."""
+    return {name: _told(estimate(f"{term.label}.{name}"), name, term.element, known) for name in term.values}
 
 
 def _told(found: Estimate, name: str, element: Element, known: Scales) -> Estimate:

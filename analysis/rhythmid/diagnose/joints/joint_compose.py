@@ -6,10 +6,12 @@ from dataclasses import replace
 from rhythmid.body.body import BODY
 from rhythmid.body.inertial_parameter import split
 from rhythmid.body.machine import Machine
+from rhythmid.diagnose.answer.compose import sizes_told
 from rhythmid.diagnose.answer.compose_effort import FIXED_SCALE
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
 from rhythmid.diagnose.answer.same_while_moving import same_while_moving
 from rhythmid.diagnose.constants import BLIND, STATED
+from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.joints.base_tilt import BaseTilt
 from rhythmid.diagnose.joints.equivalents import probability_together, shared_among
@@ -139,7 +141,8 @@ def _effect(machine: Machine, one: JointResult, answer: Diagnosis, label: str) -
     gain = _gain(one)
     known = fitted.fit.model.term(label)
     if known is not None:
-        parameters = {name: answer.parameters[f"{label}.{name}"] for name in known.values}
+        scales = scales_of(one.result.search.balance, fitted.fit.model)
+        parameters = sizes_told(known, answer.parameters.__getitem__, scales)
         element, slot, equation = known.element.name, known.element.slot, known.element.equation
     else:
         element, _ = name_of(one.joint, label, one.by_reference)
