@@ -1,8 +1,11 @@
 """A saved model has the effects that the answer states, and no others."""
 
+import math
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
+
+import pytest
 
 from rhythmid.diagnose.joints.stated_fit import stated_fit, stated_parameters
 from rhythmid.elements.catalogue import load_catalogue
@@ -25,13 +28,14 @@ class Fit:
 class Found:
     elements: tuple[str, ...]
     fit: Fit
+    spread: float = 0.0  # standard deviation of every parameter
 
     @property
     def model(self) -> Model:
         return self.fit.model
 
     def std(self) -> dict[str, float]:
-        return {}
+        return dict.fromkeys(self.model.parameters, self.spread) if self.spread else {}
 
 
 def found(*labels: str) -> Any:
@@ -63,3 +67,16 @@ def test_the_size_of_a_stated_law_is_not_shared_with_one_that_is_not_stated():
     assert told["coulomb_friction.force"].value == 1.0
     assert "linear_spring.stiffness" in told  # of the chosen hypothesis, for the joint's own answer
     assert stated_parameters(result(both, alone), ())["coulomb_friction.force"].value == 0.7
+
+
+def test_a_stated_size_has_the_uncertainty_that_the_chosen_hypothesis_has_beyond_its_fit():
+    """The choice of the model and small effects that it lacks."""
+    fitted = replace(found("coulomb_friction", "linear_spring"), spread=0.03)
+    alone = replace(found("coulomb_friction"), spread=0.04)
+    search = SimpleNamespace(hypotheses=(found(), alone, fitted))
+    known: Any = SimpleNamespace(chosen=replace(fitted, spread=0.05), nominal=found(), search=search)
+    told = stated_parameters(known, ("coulomb_friction",))
+    assert told["coulomb_friction.force"].std == pytest.approx(math.hypot(0.04, 0.04))
+    assert told["linear_spring.stiffness"].std == 0.05
+    both = stated_parameters(known, ("coulomb_friction", "linear_spring"))
+    assert both["coulomb_friction.force"].std == 0.05
