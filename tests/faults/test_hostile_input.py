@@ -7,14 +7,16 @@ import struct
 import subprocess
 import sys
 import tempfile
+import warnings
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fuzz import Watch, attempt, warm_up
 from fuzz_bags import OWN
-from fuzz_formats import robots
+from fuzz_formats import long_tables, robots
 from fuzz_targets import EXPERIMENT, TARGETS, Target
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -35,6 +37,7 @@ from rhythmid.record.message_types import stamp_path, type_fields, typestore
 from rhythmid.record.read import read_record
 from rhythmid.record.signals import Signals
 from rhythmid.record.table import Table
+from rhythmid.start.start import start
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 ZEROS = b"\0" * (1 << 20)
@@ -328,6 +331,20 @@ def test_a_table_whose_name_no_file_can_have_is_refused_in_one_line(tmp_path):
     (tmp_path / "signals.yaml").write_text(text)
     with pytest.raises(InputError, match="is not a table"):
         read_record(tmp_path / "signals.yaml")
+
+
+# Tables
+
+
+def test_init_of_a_table_with_a_number_beyond_all_bounds_warns_of_nothing(tmp_path):
+    text = long_tables()[0].decode().splitlines()
+    text[50] = ",".join([text[50].split(",")[0], "1e999", text[50].split(",")[2]])
+    text[60] = ",".join([text[60].split(",")[0], "-1e308", text[60].split(",")[2]])
+    (tmp_path / "run.csv").write_text("\n".join(text))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        with suppress(InputError):
+            start([tmp_path / "run.csv"])
 
 
 # Robots

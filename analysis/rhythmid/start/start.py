@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
@@ -15,7 +16,7 @@ from rhythmid.record.braking import WHY as TAKES_ENERGY
 from rhythmid.record.braking import braking_roles
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.inventory import Inventory, inventory
-from rhythmid.record.read import load_records, read_record
+from rhythmid.record.read import LARGEST, load_records, read_record
 from rhythmid.record.record import Record
 from rhythmid.record.rest_at_ends import rests_of, use_line
 from rhythmid.record.signals import Clock, Signals
@@ -245,11 +246,20 @@ def _guess_of_moving(
 
 def _inventory(source: str | Path, rate: float | None) -> Inventory:
     """Inventory of a source; for a bag without measurements including the vehicle's pose."""
-    found = inventory(source, rate)
+    found = _bounded(inventory(source, rate))
     may_be_motion = (meaning for meaning in map(meaning_of, found.recorded) if meaning.quantity != "effort")
     if not found.is_bag or any(meaning.commanded is not True for meaning in may_be_motion):
         return found
-    return inventory(source, rate, vehicle=True)
+    return _bounded(inventory(source, rate, vehicle=True))
+
+
+def _bounded(found: Inventory) -> Inventory:
+    """The inventory without numbers beyond all bounds, which tell nothing of a channel; a record that holds them is refused later."""
+    held = (
+        replace(one, value=np.where(np.abs(one.value) <= LARGEST, one.value, np.nan))
+        for one in found.recorded
+    )
+    return replace(found, recorded=type(found.recorded)(held))
 
 
 @threadpool_limits.wrap(limits=1)
