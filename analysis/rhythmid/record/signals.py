@@ -17,8 +17,7 @@ recording is given by record: `offset: {slow: 0, fast: 3.14}`. `sign_bit: 15` sa
 `input: none` declares that at most the forcing drives the machine. `forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}` states
 amplitude * cos(2π frequency t + phase) in the record's time. A model parameter with a different value in each record, such as a
 controller's gain, is declared by its value. If one file is used for several records, it is declared by record:
-`parameters: {position_control.proportional: {slow: 12.5, fast: 25}}`. A parameter that all records declare is not
-estimated.
+`parameters: {position_control.proportional: {slow: 12.5, fast: 25}}`. One that all records declare is not estimated.
 """
 
 import math
