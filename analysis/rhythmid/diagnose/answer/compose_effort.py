@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rhythmid.diagnose.answer.command_twins import command_twins, with_twins
+from rhythmid.diagnose.answer.command_path import equivalents_in_command_path, with_equivalents
 from rhythmid.diagnose.answer.compose import explanations, held_out_words, missing_effects, remainder_of
 from rhythmid.diagnose.answer.result import Detection, Diagnosis, Estimate, FitQuality, Scored, settled
 from rhythmid.diagnose.answer.same_while_moving import same_while_moving
@@ -35,9 +35,9 @@ FIXED_SCALE = "The recorded effort is taken to be true in scale."
 def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Diagnosis:
     """The diagnosis."""
     chosen, nominal = result.chosen, result.nominal
-    twins = command_twins(case.records, case.nominal, case.catalogue)
+    alike = equivalents_in_command_path(case.records, case.nominal, case.catalogue)
     decision = replace(
-        result.decision, equivalent=with_twins(result.decision.equivalent, result.decision.named, twins)
+        result.decision, equivalent=with_equivalents(result.decision.equivalent, result.decision.named, alike)
     )
     size = variation_of(result.search.balance)
     sizes = scales_of(result.search.balance, chosen.fit.model)
@@ -81,7 +81,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
             *delay_told(result.search.balance, chosen, case.nominal),
         ),
         excluded=tuple(
-            Untried(name, SAME_HERE if name in twins.values() else why)
+            Untried(name, SAME_HERE if name in alike.values() else why)
             for name, why in result.search.not_tried.items()
         ),
         heldout=held,

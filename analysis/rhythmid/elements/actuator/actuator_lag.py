@@ -1,19 +1,12 @@
 """Actuator lag: first order, tau_a df/dt = f_cmd - f, on the whole actuator force f0 + u.
 
-A lag shorter than one integration step h is computed with the time constant h and a direct share 1 - tau_a / h,
-whose transfer function agrees to first order in frequency. So the effect vanishes exactly at tau_a = 0, grows
-smoothly from there, and is stable. It starts at the commanded force.
+It starts at the commanded force. A lag shorter than an integration step vanishes smoothly (`elements/first_order_lag.py`).
 """
 
 from math import inf
 
 from rhythmid.elements.element import STEP, Element, Parameter
-
-
-def kernel(f, t, time_constant, step, lagged):
-    relaxation = max(time_constant, step)
-    return f + (time_constant / relaxation) * (lagged - f), (f - lagged) / relaxation
-
+from rhythmid.elements.first_order_lag import kernel
 
 ELEMENT = Element(
     name="actuator_lag",

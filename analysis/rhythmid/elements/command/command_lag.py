@@ -1,19 +1,12 @@
 """Command lag: first order, tau du_bar/dt = u - u_bar, on the command u alone; the robot's own forcing is not lagged.
 
-A lag shorter than one integration step h is computed with the time constant h and a direct share 1 - tau / h, whose
-transfer function agrees to first order in frequency. So the effect vanishes exactly at tau = 0, grows smoothly from
-there, and is stable. It starts at the command.
+It starts at the command. A lag shorter than an integration step vanishes smoothly (`elements/first_order_lag.py`).
 """
 
 from math import inf
 
 from rhythmid.elements.element import STEP, Element, Parameter
-
-
-def kernel(f, t, time_constant, step, lagged):
-    relaxation = max(time_constant, step)
-    return f + (time_constant / relaxation) * (lagged - f), (f - lagged) / relaxation
-
+from rhythmid.elements.first_order_lag import kernel
 
 ELEMENT = Element(
     name="command_lag",

@@ -1,20 +1,13 @@
 """Sensor lag: first order, tau_s dy/dt = x - y (an anti-alias filter, a slow transducer, a camera's exposure).
 
-A lag shorter than one integration step h is computed with the time constant h and a direct share 1 - tau_s / h,
-whose transfer function agrees to first order in frequency. So the effect vanishes exactly at tau_s = 0, grows
-smoothly from there, and is stable. It starts as if the machine had always moved at its initial speed: y = x - tau_s
-v.
+It starts as if the machine had always moved at its initial speed: y = x - tau_s v. A lag shorter than an
+integration step vanishes smoothly (`elements/first_order_lag.py`).
 """
 
 from math import inf
 
 from rhythmid.elements.element import STEP, Element, Parameter
-
-
-def kernel(y, t, time_constant, step, lagged):
-    relaxation = max(time_constant, step)
-    return y + (time_constant / relaxation) * (lagged - y), (y - lagged) / relaxation
-
+from rhythmid.elements.first_order_lag import kernel
 
 ELEMENT = Element(
     name="sensor_lag",

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rhythmid.diagnose.answer.command_twins import command_twins, with_twins
+from rhythmid.diagnose.answer.command_path import equivalents_in_command_path, with_equivalents
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
@@ -17,7 +17,7 @@ PLAIN = Model.from_text("inertia: {mass: {value: 1.0, unit: kg}}\n", catalogue=C
 
 
 def test_a_recorded_command_shows_the_lag_of_its_own_path_as_one_of_the_actuator():
-    assert command_twins([COMMANDED], PLAIN, CATALOGUE)["actuator_lag"] == "command_lag"
+    assert equivalents_in_command_path([COMMANDED], PLAIN, CATALOGUE)["actuator_lag"] == "command_lag"
 
 
 def test_a_measured_effort_or_a_forcing_or_a_controller_tells_them_apart():
@@ -27,14 +27,16 @@ def test_a_measured_effort_or_a_forcing_or_a_controller_tells_them_apart():
         replace(COMMANDED, effort=CHANNEL),
         replace(COMMANDED, forcing=CHANNEL),
     ]
-    assert not any(command_twins([one], PLAIN, CATALOGUE) for one in others)
-    assert not command_twins([COMMANDED], servo, CATALOGUE)
+    assert not any(equivalents_in_command_path([one], PLAIN, CATALOGUE) for one in others)
+    assert not equivalents_in_command_path([COMMANDED], servo, CATALOGUE)
 
 
-def test_the_twin_of_a_named_law_stands_beside_it():
-    twins = {"actuator_lag": "command_lag"}
-    assert with_twins((), ["actuator_lag", "coulomb_friction"], twins) == (("actuator_lag", "command_lag"),)
-    assert with_twins((("actuator_lag", "x"),), ["actuator_lag"], twins) == (
+def test_the_equivalent_of_a_named_law_stands_beside_it():
+    alike = {"actuator_lag": "command_lag"}
+    assert with_equivalents((), ["actuator_lag", "coulomb_friction"], alike) == (
+        ("actuator_lag", "command_lag"),
+    )
+    assert with_equivalents((("actuator_lag", "x"),), ["actuator_lag"], alike) == (
         ("actuator_lag", "x", "command_lag"),
     )
-    assert with_twins((), ["coulomb_friction"], twins) == ()
+    assert with_equivalents((), ["coulomb_friction"], alike) == ()
