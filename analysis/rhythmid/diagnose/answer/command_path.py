@@ -31,7 +31,7 @@ def equivalents_in_command_path(
     return {
         one.name: of_command[one.kernel]
         for one in catalogue.values()
-        if one.slot == "actuator" and one.kernel in of_command
+        if one.slot == "actuator" and one.kernel is not None and one.kernel in of_command
     }
 
 
