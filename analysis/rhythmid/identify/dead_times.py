@@ -8,7 +8,9 @@ from collections.abc import Iterator, Sequence
 
 from rhythmid.model import Model
 
-STARTS = (0.0, 0.05, 0.2, 0.5)  # dead times from which a search begins, in units of 1/ω of the motion
+# dead times from which a search begins, in units of 1/ω of the motion: from none to a phase of half a radian, beyond which a
+# controller's loop is hardly stable
+STARTS = (0.0, 0.05, 0.2, 0.5)
 
 
 def dead_times(model: Model) -> dict[str, str]:

@@ -47,7 +47,7 @@ def cycle_columns(series: Series, pumping: Pumping) -> Array:
 
 def explained(fit: Fit, pumping: Pumping | None) -> Search:
     """Compare the residuals of the fit with the motion, with the response to the command and with the noise."""
-    left = response = floor = count = 0.0
+    left = response = floor = 0.0
     for one, residual in zip(fit.run.series, fit.residuals):
         used = one.used
         columns = np.ones((one.blocks, 1)) if pumping is None else cycle_columns(one, pumping)
@@ -60,7 +60,6 @@ def explained(fit: Fit, pumping: Pumping | None) -> Search:
         power = np.abs(np.fft.rfft(moved * np.hanning(len(moved)))) ** 2
         high = power[int(0.6 * len(power)) :]
         floor += float(np.mean(high)) * 2.0 * len(high) / 0.4 / 0.375 / len(moved)
-        count += float(used.sum())
     explained = max(response - floor, 1e-300)
     motion = fit.nrmse() if all(one.ignored is None for one in fit.run.series) else 0.0
     least = max(floor, 1e-18 * response, 1e-300)
