@@ -4,7 +4,6 @@ robot files, tables of a delay; valid, corrupted, and read."""
 import io
 import json
 import random
-import struct
 import zipfile
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -13,8 +12,8 @@ from typing import Any
 
 import numpy as np
 from fuzz_inputs import COUNT, VALUES
+from matlab_objects import EVEN, timeseries_file
 from mutation import spoil_bytes, spoil_text
-from scipy.io import savemat
 
 from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.record.grouped_runs import grouped_runs
@@ -199,61 +198,9 @@ def npys() -> list[bytes]:
     return [made[0], *made]
 
 
-NAMES = ("timeseries", "timemetadata", "Name", "TimeInfo", "Data_", "Length", "Start_", "Increment_")
-
-
 def objects() -> list[bytes]:
-    """A `timeseries` in a MAT file of version 5, as MATLAB writes objects: properties in a table of words beside the cells."""
-    object_mark = 0xDD000000
-    row = {name: place + 1 for place, name in enumerate(NAMES)}
-    names = b"".join(one.encode() + b"\0" for one in NAMES)
-    names += b"\0" * (-len(names) % 8)
-    own = [0, 0]
-    for block in (
-        (("Name", 0), ("TimeInfo", 1), ("Data_", 2)),
-        (("Length", 3), ("Start_", 4), ("Increment_", 5)),
-    ):
-        own += [len(block), *(word for name, value in block for word in (row[name], 1, value))]
-        own += [0] * (len(own) % 2)
-    parts = (
-        [0, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0],
-        [0, 0],
-        [*[0] * 6, 1, 0, 0, 0, 1, 1, 2, 0, 0, 0, 2, 2],
-        own,
-        [0, 0],
-    )
-    ends = np.cumsum([40 + len(names), *(4 * len(part) for part in parts)])
-    words = b"".join(struct.pack(f"<{len(part)}I", *part) for part in parts)
-    tables = struct.pack("<8I", 4, len(NAMES), *ends) + b"\0" * 8 + names + words
-
-    def element(kind: int, content: bytes) -> bytes:
-        return struct.pack("<2I", kind, len(content)) + content + b"\0" * (-len(content) % 8)
-
-    def plain(value: Any) -> bytes:
-        file = io.BytesIO()
-        savemat(file, {"x": value})
-        return file.getvalue()[128:]
-
-    def opaque(name: str, of_class: str, content: bytes) -> bytes:
-        texts = b"".join(element(1, one.encode()) for one in (name, "MCOS", of_class))
-        return element(14, element(6, struct.pack("<2I", 17, 0)) + texts + content)
-
-    def reference(number: int) -> Any:
-        return np.array([[object_mark], [2], [1], [1], [number], [1]], dtype=np.uint32)
-
-    listed = [np.frombuffer(tables, dtype=np.uint8)[:, None], np.zeros((1, 0)), "Motor speed", reference(2), VALUES[:, None],
-              float(COUNT), 0.0, STEP]  # fmt: skip
-    cells = np.empty((len(listed), 1), dtype=object)
-    cells[:, 0] = listed
-    field = struct.pack("<2HI", 5, 4, 32) + element(1, b"MCOS".ljust(32, b"\0"))
-    wrapped = (
-        element(6, struct.pack("<2I", 2, 0)) + element(5, struct.pack("<2i", 1, 1)) + element(1, b"") + field
-    )
-    whole = element(14, wrapped + opaque("", "FileWrapper__", plain(cells)))
-    file = io.BytesIO()
-    savemat(file, {"x": np.frombuffer(b"\x00\x01IM\0\0\0\0" + whole, dtype=np.uint8)[None, :]})
-    unnamed = file.getvalue().replace(struct.pack("<2H4s", 1, 1, b"x"), struct.pack("<2H4s", 1, 0, b""), 1)
-    return [unnamed[:128] + opaque("run", "timeseries", plain(reference(1))) + unnamed[128:]]
+    """A `timeseries` of MATLAB."""
+    return [timeseries_file(np.array(VALUES)[:, None], EVEN, (float(COUNT), 0.0, STEP))]
 
 
 # What `init` and `split` do with tables
