@@ -3,6 +3,7 @@
 import json
 import re
 import time
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -317,3 +318,13 @@ def test_it_speaks_the_command_type_of_the_robot_on_its_topic(graph, kind, param
 def test_a_command_that_cannot_be_made_is_refused(graph, parameters, said):
     with pytest.raises(InputError, match=said):
         graph.add(ExcitationNode, max_effort=1.0, excitation=json.dumps(CONSTANT), **parameters)
+
+
+def test_a_report_of_a_long_excitation_does_not_copy_it(excite):
+    """A copy of an hour of commands takes tens of milliseconds, in which no measurement is read."""
+    node, *_ = excite({**CONSTANT, "length": 600.0})
+    tracemalloc.start()
+    node.figures()
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 0.1 * node._effort.nbytes

@@ -55,6 +55,7 @@ class ExcitationNode(GraphNode):
 
     def configure(self) -> None:
         self._effort = self._command()
+        self._peak = float(np.max(np.abs(self._effort), initial=0.0))  # once: of an hour it takes 50 ms
         self._watch: Any = self._judge()
         self._state = "idle"  # idle -> running (-> ramping) -> finished | stopped
         self._sent = 0
@@ -151,7 +152,7 @@ class ExcitationNode(GraphNode):
             "sent": str(self._sent),
             "of": str(len(self._effort)),
             "other_graphs": ", ".join(self._other_graphs()),
-            "peak_effort": f"{np.max(np.abs(self._effort), initial=0.0):g}",
+            "peak_effort": f"{self._peak:g}",
             **(self._grid.figures() if self._grid else {}),
             **({} if self.lockstep else self._lateness.summary("lateness")),
         }
