@@ -19,14 +19,16 @@ from rhythmid.proof.concealment import (
     MOST_EFFORT,
     NULL_CLUTTER_MOST,
     STRONGEST,
-    Concealed,
+    Yardstick,
+    stands_out,
 )
-from rhythmid.proof.draw import LACKED, _conceal, absent_with, candidates, draw_case, related
+from rhythmid.proof.draw import LACKED, absent_with, candidates, draw_case, related
 from rhythmid.proof.equations import EQUATIONS, FOREIGN
 from rhythmid.proof.machine import TIMING, Effect
 from rhythmid.proof.machines.designs import DESIGNS
 from rhythmid.proof.machines.hopper import LONGEST_DELAY
 from rhythmid.proof.noise import NOISES, Log, draw_log, draw_noise
+from rhythmid.proof.nominal import free_attributes, nominal_model
 from rhythmid.proof.seal import seal, truth_of, unseal
 from rhythmid.proof.sizes import SIZES
 from rhythmid.proof.sizing import strength_for
@@ -103,25 +105,38 @@ def test_pairs_are_of_different_families(catalogue, monkeypatch):
         assert not related(catalogue, first, second)
 
 
-@pytest.mark.parametrize(("beside", "drawn"), [(0.004, False), (0.006, True)])
-def test_each_effect_of_a_pair_is_of_practical_size_beside_the_other(monkeypatch, catalogue, beside, drawn):
+@pytest.mark.parametrize(("beside", "seen"), [(0.004, False), (0.006, True)])
+def test_each_effect_of_a_pair_is_of_practical_size_beside_the_other(catalogue, beside, seen):
     """0.4 % of the motion is seen here, at twice the noise, but the diagnosis need not name it."""
     noise = 0.002
     stick: Any = SimpleNamespace(
         by_effort=False, noise=noise, least=LEAST_MOTION, exact=hopper(), ratio=lambda *_: beside / noise
     )
-    effects = {
-        "quadratic_drag": Effect("quadratic_drag", {"coefficient": 0.1}),
-        "coulomb_friction": Effect("coulomb_friction", {"force": 0.1}),
-    }
-    monkeypatch.setattr(
-        "rhythmid.proof.draw.sized_effect", lambda _, name, *__: Concealed(effects[name], 4.0)
+    drag = Effect("quadratic_drag", {"coefficient": 0.1})
+    friction = Effect("coulomb_friction", {"force": 0.1})
+    assert stands_out(stick, drag, [drag, friction], catalogue) == seen
+    assert stands_out(stick, drag, [drag], catalogue)
+
+
+def test_an_effect_is_not_concealed_where_a_small_one_masks_it(catalogue):
+    """A fast relaxation acts on an oscillator as a damper, which the fit absorbs. But the decay ends before the cubic stiffness is seen."""
+    design, rng = DESIGNS["decay"], np.random.default_rng(0)
+    rig, fixed = design.draw(rng, ["cubic_stiffness"]), design.known(["cubic_stiffness"])
+    exact = Model.from_text(nominal_model(rig, design, rig.machine, fixed, (0.0, 0.0)), catalogue=catalogue)
+    noise = draw_noise(rng, rig.scale, "white", design.noise)
+    plain = rig.observe_all([])
+    assert plain is not None
+    stick = Yardstick.of(rig, exact, free_attributes(design, fixed), noise, False, plain)
+    machine, furthest = rig.machine, max(abs(run.start[0]) for run in rig.runs)
+    frequency = np.sqrt(machine.stiffness / machine.mass)
+    cubic = Effect("cubic_stiffness", {"coefficient": -0.02 * machine.stiffness / furthest**2})
+    drag = Effect("quadratic_drag", {"coefficient": 0.05 * machine.damping / (furthest * frequency)})
+    relaxation = Effect(
+        "viscoelastic_relaxation", {"stiffness": 0.4 * machine.stiffness, "time_constant": 0.2 / frequency}
     )
-    rig: Any = SimpleNamespace(lacks=None)
-    motion: Any = None
-    monkeypatch.setattr("rhythmid.proof.draw.SIZES", dict.fromkeys(effects, lambda *_: None))
-    made = _conceal(tuple(effects), rig, stick, motion, catalogue, np.random.default_rng(0))
-    assert (made is not None) == drawn
+    assert stick.ratio([relaxation]) < 0.1 < 10.0 < stick.ratio([cubic])
+    assert stands_out(stick, cubic, [cubic, drag], catalogue)
+    assert not stands_out(stick, cubic, [cubic, relaxation], catalogue)
 
 
 def test_what_contains_or_equals_an_effect_leaves_the_catalogue_with_it(catalogue):

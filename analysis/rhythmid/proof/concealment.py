@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rhythmid.elements.catalogue import Catalogue
 from rhythmid.model import Model
 from rhythmid.proof.equations import FOREIGN
 from rhythmid.proof.machine import Effect, Observation
@@ -109,6 +110,21 @@ def sized_effect(
     if not least <= reached <= most:
         return None
     return Concealed(Effect(name, sized(strength)), reached, reached * stick.noise)
+
+
+def stands_out(stick: Yardstick, effect: Effect, every: Sequence[Effect], catalogue: Catalogue) -> bool:
+    """Whether `effect` is detectable and of practical size where all of `every` act, as it is where it acts alone.
+
+    Other effects may mask it: a small one that damps the motion, too, ends it before a stiffness is seen. Asked is what a model that
+    has all others of the catalogue leaves after a refit. Not tested where mismatches are measured in the effort.
+    """
+    if stick.by_effort or len(every) == 1:
+        return True
+    known = stick.exact
+    for other in every:
+        if other is not effect and other.name in catalogue:
+            known = known.with_element(catalogue[other.name], other.parameters)
+    return stick.ratio(every, known) >= faintest(stick)
 
 
 def put_clutter(

@@ -17,6 +17,7 @@ from rhythmid.proof.concealment import (
     faintest,
     put_clutter,
     sized_effect,
+    stands_out,
 )
 from rhythmid.proof.machine import Effect, Observation
 from rhythmid.proof.machines.designs import DESIGNS
@@ -211,6 +212,8 @@ def _draw(
         return None
     added = [one.effect for one in concealed if one.effect != rig.lacks]
     every = [*added, *(one.effect for one in clutter)]
+    if not all(stands_out(stick, effect, every, catalogue) for effect in added):
+        return None
     joint = concealed[0].ratio if len(concealed) == 1 and not clutter else stick.joint(rig, every)
     if not math.isfinite(joint):
         return None
@@ -248,10 +251,4 @@ def _conceal(
         if found is None:
             return None
         concealed.append(found)
-    added = [one.effect for one in concealed if one.effect != rig.lacks]
-    for effect in added if len(added) > 1 and not stick.by_effort else ():  # one effect may mask the other
-        beside = next(other for other in added if other is not effect)
-        known = stick.exact.with_element(catalogue[beside.name], beside.parameters)
-        if stick.ratio(added, known) < least:
-            return None
     return tuple(concealed)
