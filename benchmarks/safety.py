@@ -146,8 +146,9 @@ def trial(bench: Bench, fault: str) -> float:
 
 @contextmanager
 def load(number: int) -> Iterator[None]:
-    """This number of busy processes."""
-    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(number)]
+    """This number of busy processes, each in a session of its own, as programs of other terminals are."""
+    line = [sys.executable, "-c", "while True: pass"]
+    busy = [subprocess.Popen(line, start_new_session=True) for _ in range(number)]
     try:
         yield
     finally:
