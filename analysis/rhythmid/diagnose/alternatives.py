@@ -61,7 +61,7 @@ def alternatives(
     moved: list[Proposal] = []
     kin: list[Proposal] = []
     for label in chosen.added:
-        beside = _base(chosen, tuple(name for name in chosen.added if name != label))
+        beside = chosen.without(label)
         if beside.added:
             freed += _freed(beside)
         term = chosen.model.term(label)
@@ -98,11 +98,10 @@ def _reduced(chosen: Trial, weighed: Sequence[Trial]) -> Iterator[Proposal]:
         if len(trial.added) < 2 or trial.chi2 >= chosen.chi2:
             continue
         for label in trial.added:
-            slim = trial.model.pruned(label)
-            rest = tuple(name for name in trial.added if slim.term(name) is not None)
-            if rest and tuple(sorted(rest)) not in known:
-                known.add(tuple(sorted(rest)))
-                yield Proposal(rest, slim, ({},))
+            slim = trial.without(label)
+            if slim.added and slim.key not in known:
+                known.add(slim.key)
+                yield Proposal(slim.added, slim.model)
 
 
 def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Trial]) -> Iterator[Proposal]:
@@ -154,19 +153,10 @@ def _renamed(parameter: str, label: str, own: str) -> str:
     return f"{own}.{name}" if term == label else parameter
 
 
-def _base(chosen: Trial, rest: tuple[str, ...]) -> Trial:
-    """The chosen trial reduced to the effects `rest`, as a start; effects that need a removed one are dropped, too."""
-    model = chosen.model
-    for label in chosen.added:
-        if label not in rest:
-            model = model.pruned(label)
-    return replace(chosen, added=tuple(label for label in rest if model.term(label) is not None), model=model)
-
-
 def _freed(base: Trial) -> Iterator[Proposal]:
     for name in fixed_values(base.model, base.added):
         freed = base.model.with_parameters({name: replace(base.model.parameters[name], fixed=False)})
-        yield Proposal((*base.added, name), freed, ({},))
+        yield Proposal((*base.added, name), freed)
 
 
 def fixed_values(model: Model, effects: Sequence[str] = ()) -> list[str]:
@@ -196,7 +186,7 @@ def _one_law(chosen: Trial, known: Trajectories, sizes: Scales) -> Iterator[Prop
         name = {"actuator": "effort", "sensor": "signal"}.get(slot, quantity)
         if len(laws) < SERIES or name not in FREE_MAPS:
             continue
-        base = _base(chosen, tuple(label for label in chosen.added if label not in laws))
+        base = chosen.without(*laws)
         guess = first_guess(np.concatenate(values_of(known, name)))
         yield propose(base.model, FREE_MAPS[name], [guess], base.added)
 

@@ -66,8 +66,8 @@ def eliminate(
 def _without_idle(best: Trial, run: Callable[[Trial, list[Proposal]], list[Trial]], margin: float) -> Trial:
     """The model without the effects that can be left out."""
     while len(best.added) > 1:
-        slim = [best.model.pruned(label) for label in best.added]
-        dropped = run(best, [Proposal(rest, model, ({},)) for model in slim if (rest := _rest(best, model))])
+        slim = [best.without(label) for label in best.added]
+        dropped = run(best, [Proposal(one.added, one.model) for one in slim if one.added])
         kept = [t for t in dropped if t.bic() < best.bic() + margin]
         if not kept:
             break
@@ -92,22 +92,21 @@ def _swaps(
         names = set(family)
         if len(best.added) > 1:
             names |= scored | set(list(alone)[:RIVALS_TRIED])
-        slim = best.model.pruned(label)
-        rest = _rest(best, slim)
+        slim = best.without(label)
         for name in sorted(names - {best.element(other).name for other in best.added}):
-            starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
+            starts = _starts_for(catalogue, name, series, slim.model, rounds, 8 if name in family else 1)
             beside: list[dict[str, float]] = []
             if starts and name in family:  # start a special case at the values of the law that contains it
                 own = {parameter.name for parameter in catalogue[name].parameters}
                 values = _values(best, label).items()
                 starts.insert(0, starts[0] | {key: value for key, value in values if key in own})
-            elif tuple(sorted((*rest, name))) in trials:
+            elif tuple(sorted((*slim.added, name))) in trials:
                 continue
             elif name in alone:
                 # the fit with this effect alone also gives the other parameters: a spring, for example, contains a pendulum's gravity
-                starts, beside = [_values(alone[name], name), *starts], [_given(alone[name], slim)]
+                starts, beside = [_values(alone[name], name), *starts], [_given(alone[name], slim.model)]
             if starts:
-                swaps.append(propose(slim, catalogue[name], starts, rest, beside=beside))
+                swaps.append(propose(slim.model, catalogue[name], starts, slim.added, beside=beside))
     return swaps
 
 
@@ -125,11 +124,6 @@ def _values(trial: Trial, label: str) -> dict[str, float]:
 def _given(trial: Trial, model: Model) -> dict[str, float]:
     """A trial's values of the parameters that are free in another model, too."""
     return {name: trial.model.value(name) for name in model.free if name in trial.model.parameters}
-
-
-def _rest(trial: Trial, slim: Model) -> tuple[str, ...]:
-    """The added effects that are still in a reduced model."""
-    return tuple(name for name in trial.added if slim.term(name) is not None)
 
 
 def _stands_for(trial: Trial, best: Trial) -> bool:

@@ -20,7 +20,7 @@ CHAINS = ("command", "actuator", "sensor")
 
 def in_best_order(trial: Trial, series: Sequence[Series], noise: NoiseModel, step: float) -> Trial:
     """The trial, or the same effects with the newest one moved along its chain where that fits better."""
-    others = [Proposal(trial.added, model, ({},)) for model in other_orders(trial.model, trial.added[-1])]
+    others = [Proposal(trial.added, model) for model in other_orders(trial.model, trial.added[-1])]
     if not others or time_is_up():
         return trial
     moved, _ = run_trials(others, series, Origin.of(trial), noise, step)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,14 @@ class Trial:
         if term is None:
             raise KeyError(label)
         return term.element
+
+    def without(self, *labels: str) -> "Trial":
+        """A start without these effects, and without those that need one of them; its other fields are still those of the whole fit."""
+        model = self.model
+        for label in labels:
+            model = model.pruned(label)
+        kept = (one for one in self.added if one not in labels and model.term(one) is not None)
+        return replace(self, added=tuple(kept), model=model)
 
 
 @dataclass(frozen=True)
@@ -142,7 +150,7 @@ class Proposal:
 
     added: tuple[str, ...]
     model: Model
-    guesses: tuple[dict[str, float], ...]
+    guesses: tuple[dict[str, float], ...] = ({},)
     ceiling: float = math.inf
     faint: tuple[dict[str, float], ...] = ()
 
