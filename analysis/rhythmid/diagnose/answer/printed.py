@@ -114,9 +114,7 @@ def remainder_words(found: Diagnosis) -> str:
     if not left.significant:
         return "nothing that any free function predicts better than chance"
     if found.verdict == "consistent":
-        fit = found.refitted_nominal
-        error = fit.train_nrmse if fit.heldout_nrmse is None else fit.heldout_nrmse
-        return f"{remaining_error(error, found.scoring.kind)}, part of which depends on {left.goes_with}"
+        return f"{remaining_error(found.refitted_nominal.error, found.scoring.kind)}, part of which depends on {left.goes_with}"
     return f"{written_percent(left.share)} of the mismatch, which depends on {left.goes_with}"
 
 

@@ -95,6 +95,11 @@ class FitQuality:
     train_nrmse: float
     heldout_nrmse: float | None
 
+    @property
+    def error(self) -> float:
+        """The error on held-out records, if there are any."""
+        return self.train_nrmse if self.heldout_nrmse is None else self.heldout_nrmse
+
 
 @dataclass(frozen=True)
 class Curve:

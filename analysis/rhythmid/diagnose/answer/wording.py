@@ -104,8 +104,7 @@ def _nothing_missing(decision: Decision, plain: FitQuality, whole: str, noise_kn
     left = decision.unexplained
     if noise_known and not left.significant:
         return f"{said} down to the noise."
-    error = plain.train_nrmse if plain.heldout_nrmse is None else plain.heldout_nrmse
-    small = f"{number(100.0 * error, 2)} % of the {whole}"
+    small = f"{number(100.0 * plain.error, 2)} % of the {whole}"
     if left.significant:
         return f"{said} but for {small}, part of which depends on {left.goes_with}."
     return f"{said} but for {small}, in which no test finds a cause."

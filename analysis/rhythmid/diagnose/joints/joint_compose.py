@@ -18,7 +18,6 @@ from rhythmid.diagnose.joints.equivalents import probability_together, shared_am
 from rhythmid.diagnose.joints.gear_compliance import GearCompliance
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import OF_LINKS, JointResult, name_of
-from rhythmid.diagnose.joints.misfit import error_of
 from rhythmid.diagnose.joints.row_agreement import agreeing, words_of
 from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.places import SENTENCES
@@ -247,7 +246,7 @@ def _of_gear(gear: GearCompliance, answer: Diagnosis) -> JointEffect:
 
 def _explained_at(answer: Diagnosis) -> tuple[float, float]:
     """Share of a joint's mismatch that is explained, and reduction of its error."""
-    before, after = (error_of(answer.fit[name]) for name in ("refitted_nominal", "augmented"))
+    before, after = (one.error for one in (answer.refitted_nominal, answer.augmented))
     share = 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
     return max(share, 0.0), max(before - after, 0.0)
 
@@ -312,7 +311,7 @@ def _holds(one: JointEffect, answers: Mapping[str, Diagnosis], of_links: Mapping
         answer is None or answer.verdict == "missing_physics" or same
     ):  # all joints together have judged a corrected link
         return True
-    return not _sure_in_part(one, answers) and error_of(answer.fit["augmented"]) < BLIND
+    return not _sure_in_part(one, answers) and answer.augmented.error < BLIND
 
 
 def _sure_in_part(one: JointEffect, answers: Mapping[str, Diagnosis]) -> bool:
@@ -320,7 +319,7 @@ def _sure_in_part(one: JointEffect, answers: Mapping[str, Diagnosis]) -> bool:
     answer = None if one.joint is None else answers.get(one.joint)
     if answer is None or one.link is not None or answer.verdict == "missing_physics":
         return False
-    return answer.joint_probability < STATED <= one.probability and error_of(answer.fit["augmented"]) < BLIND
+    return answer.joint_probability < STATED <= one.probability and answer.augmented.error < BLIND
 
 
 def _in_its_place(

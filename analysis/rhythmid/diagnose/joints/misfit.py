@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from rhythmid.body.machine import Machine
-from rhythmid.diagnose.answer.result import Diagnosis, FitQuality
+from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.constants import BLIND, HOPELESS
 from rhythmid.diagnose.joints.joint_case import JointResult
 from rhythmid.identify.joints.effort_power import braking_note
@@ -17,7 +17,7 @@ def misfits(answers: Mapping[str, Diagnosis], braking: Mapping[str, str]) -> Ite
     the effort than an identified model leaves.
     """
     for joint, answer in answers.items():
-        nominal, named = error_of(answer.fit["refitted_nominal"]), error_of(answer.fit["augmented"])
+        nominal, named = answer.refitted_nominal.error, answer.augmented.error
         if nominal < HOPELESS or named < BLIND:
             continue
         if joint in braking:
@@ -64,8 +64,3 @@ def left_in_words(verdict: str, share: float, significant: bool, error: float | 
     if significant:
         return f"{100.0 * share:.0f} % of the mismatch"
     return "noise" if error is None or error < BLIND else "not explained"
-
-
-def error_of(quality: FitQuality) -> float:
-    """Relative error of the effort, on held-out data if there are any."""
-    return quality.train_nrmse if quality.heldout_nrmse is None else quality.heldout_nrmse
