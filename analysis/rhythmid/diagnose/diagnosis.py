@@ -94,6 +94,12 @@ class Answer(Result):
         """The verdict in a few sentences."""
         return self.diagnosis.summary
 
+    def saying(self, notes: Sequence[str] = (), excluded: Sequence[Untried] = ()) -> "Answer":
+        """The answer with more notes, and with more that was not tried."""
+        found = self.diagnosis
+        more = replace(found, notes=(*found.notes, *notes), excluded=(*found.excluded, *excluded))
+        return replace(self, diagnosis=more)
+
     @property
     def covariance(self) -> JointCovariance:
         """Covariance of the chosen model's parameters, including the uncertainty of the choice of the model.
@@ -247,8 +253,8 @@ def diagnose(
                 untried.append(Untried("a comparison with the recorded effort", SPENT))
             else:
                 made.append(_also_by_effort(whole, effort, chosen))
-        answer = _with_untried(_compared(chosen, made), untried)
-        return with_unit_warning(answer, case.nominal, warned)
+        told = contradictions([one is chosen for one in made].index(True), [one.diagnosis for one in made])
+        return with_unit_warning(chosen.saying(told, untried), case.nominal, warned)
 
 
 def _chosen(made: Sequence[Answer]) -> Answer:
@@ -355,7 +361,7 @@ def _by_motion(
         model = without_record_zero(without_free_maps(result.search.fit.model))
         kept = admissible(model, case.nominal, result.search.fit.std)
         told = [note for name, note in kept.moved.items() if name in case.nominal.parameters]
-        yield Answer(replace(diagnosis, notes=(*diagnosis.notes, *told)), kept.model, result)
+        yield Answer(diagnosis, kept.model, result).saying(told)
 
 
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST_EFFECTS) -> Answer:
@@ -374,20 +380,6 @@ def _also_by_effort(case: Case, effort: Applicability, chosen: Answer) -> Answer
     return _by_effort(replace(case, nominal=nominal), effort, (), len(chosen.diagnosis.missing))
 
 
-def _compared(answer: Answer, made: Sequence[Answer]) -> Answer:
-    """The answer with a note for each other answer in `made` that contradicts it."""
-    place = next(index for index, one in enumerate(made) if one is answer)
-    found = answer.diagnosis
-    told = contradictions(place, [one.diagnosis for one in made])
-    return replace(answer, diagnosis=replace(found, notes=(*found.notes, *told))) if told else answer
-
-
-def _with_untried(answer: Answer, untried: Sequence[Untried]) -> Answer:
-    """The answer, extended by the scoring modes that were not tried for lack of time or because of the records."""
-    found = answer.diagnosis
-    return replace(answer, diagnosis=replace(found, excluded=(*found.excluded, *untried)))
-
-
 def with_unit_warning(answer: Answer, nominal: Model, warned: str | None) -> Answer:
     """The answer with a warning about a channel that seems to be in another unit.
 
@@ -396,5 +388,4 @@ def with_unit_warning(answer: Answer, nominal: Model, warned: str | None) -> Ans
     """
     if warned is None or shift(nominal, answer.model) < BACK:
         return answer
-    first = answer.diagnosis
-    return replace(answer, diagnosis=replace(first, notes=(*first.notes, warned)))
+    return answer.saying([warned])

@@ -48,6 +48,7 @@ from rhythmid.identify.record_scales import scales
 from rhythmid.identify.robust_covariance import with_robust_covariance
 from rhythmid.identify.series import Series
 from rhythmid.identify.student import autocorrelation_time
+from rhythmid.report.quantity import sentence
 
 # hypotheses that compete beside those of the search, if there is time
 OTHER_KINDS = "freed values, longer delays, other places, free functions and related laws"
@@ -347,8 +348,7 @@ def _with_jitter(scoring: Scoring) -> Calibration:
     if jitter is None:
         return found
     fit = weighed(found.fit, jitter)
-    note = f"{jitter.words[0].upper()}{jitter.words[1:]}."
-    return replace(found, fit=fit, series=fit.run.series, notes=(*found.notes, note))
+    return replace(found, fit=fit, series=fit.run.series, notes=(*found.notes, sentence(jitter.words)))
 
 
 def _nominal(contenders: Sequence[Contender]) -> Trial:

@@ -4,6 +4,7 @@ A row has a statistic, and applies where the statistic is above its threshold. `
 table as Markdown.
 """
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -310,15 +311,7 @@ def table() -> str:
 
 def _words(reason: str) -> str:
     """A reason with an ellipsis for each figure."""
-    figures = {
-        "goes_with": "…",
-        "left": "…",
-        "missed": "…",
-        "structured": "…",
-        "lost": "…",
-        "detectable": "…",
-    }
-    return reason.replace(":.0f", "").replace(":.2g", "").format(**figures)
+    return re.sub(r"\{.*?\}", "…", reason)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from rhythmid.diagnose.verdict import Decision
 from rhythmid.diagnose.verdict_rules import LONGER_DELAY
 from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
-from rhythmid.report.quantity import in_words, number, with_std, with_written_unit
+from rhythmid.report.quantity import in_words, number, sentence, with_std, with_written_unit
 from rhythmid.simulation.transport import INPUT_DELAY
 
 NOT_LOCATED = "not located"
@@ -36,11 +36,6 @@ def location_of(
     if verdict == "consistent":
         return Location(None, f"nowhere: the refitted nominal model explains the {whole}", tuple(evidence))
     return Location(slot, SENTENCES.get(slot or "", NOT_LOCATED) + depends, tuple(evidence))
-
-
-def _begun(words: str) -> str:
-    """A sentence with its first letter in upper case."""
-    return words[:1].upper() + words[1:]
 
 
 def _some_form_of(decision: Decision, stated: Sequence[str] = ()) -> str:
@@ -80,7 +75,7 @@ def summary_of(
     `whole` is the quantity that errors are a share of. `freed` describes the value that the chosen hypothesis frees besides its
     effects: one that is fixed, or the delay. `noise_known`: whether the noise is known otherwise than as what the model leaves.
     """
-    value = "" if freed is None else _begun(freed)
+    value = sentence(freed or "")
     if decision.verdict == "missing_physics":
         return _lacking(decision, missing, plain, augmented, whole, value)
     if value:
@@ -137,7 +132,7 @@ def _lacking(
 def _undecided(decision: Decision, missing: Sequence[MissingEffect]) -> str:
     families = _some_form_of(decision)
     law = f"{families}, but the law is undecided: {decision.reason}."
-    said = law if families else f"{_begun(decision.reason)}."
+    said = law if families else sentence(decision.reason)
     groups = decision.equivalent
     of_main = bool(groups) and (not missing or groups[0][0] == missing[0].element)
     if of_main and decision.rule == "rivals":

@@ -24,7 +24,7 @@ from rhythmid.elements.places import SENTENCES
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 from rhythmid.identify.joints.reference_delay import ReferenceDelay
 from rhythmid.model import INERTIA
-from rhythmid.report.quantity import in_words
+from rhythmid.report.quantity import in_words, sentence
 from rhythmid.simulation.transport import INPUT_DELAY
 
 EQUATIONS = {  # for quantities that are not elements: slot, meaning, and the name of the one parameter
@@ -286,7 +286,7 @@ def summary_of_joints(
             continue
         told |= {one.link} if one.link else set()
         said.append(f"{one.joint}: {what}")
-    words = "" if tilt is None else f"{tilt.words[0].upper()}{tilt.words[1:]}."
+    words = "" if tilt is None else sentence(tilt.words)
     words += f" The model is wrong at {'; '.join(said)}." if said else ""
     words += f" Whatever else is wrong there: {'; '.join(beside)}." if beside else ""
     words += f" In doubt: {'; '.join(doubted)}." if doubted else ""
