@@ -234,6 +234,8 @@ class Element:
     # changes with time what the drive passes through: a gain that fades, a clock, a delay
     drifts: bool = False
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
+    # fields that differ at a joint of a machine, whose inertia and weight are known from the body
+    at_joint: Mapping[str, Any] = field(default_factory=dict)
     ranges: Callable[[Scales], Mapping[str, tuple[float, float]]] | None = None
     hops: Callable[[Scales], Mapping[str, float]] | None = None
     against: Against | None = None

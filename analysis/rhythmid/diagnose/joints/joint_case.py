@@ -23,17 +23,10 @@ from rhythmid.simulation.transport import INPUT_DELAY
 # gain of log likelihood that a score test has to predict for an addition to be fitted: 1 in 70 reaches it by chance (chi-square),
 # and a named effect has to gain more than twice as much
 PROMISING = 3.0
-STIFFNESS = 0.1  # first guess of a spring: share of the effort at the size of the motion
 # the name in an answer for a wrong quantity of a link
 OF_LINKS = {
     MASS: "link_mass", TURNING: "link_inertia", PAYLOAD: "payload", CENTRE: "link_centre_of_mass", LOAD: "link_mass_and_centre"
 }  # fmt: skip
-GAINS = (0.9, 1.1)  # first guesses of an actuator's gain
-# first guesses of a limit of the reference's rate, in standard deviations of the joint's speed: if the limit acts most of the time,
-# the reference and the joint move at that rate
-RATES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
-# [Hz] usual rates at which a drive may take a new reference; faster ones do not show at the rates of records
-CLOCKS = (125.0, 100.0, 80.0, 60.0, 50.0, 40.0, 30.0, 25.0, 20.0, 10.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,33 +52,10 @@ class JointResult:
 def joint_catalogue(catalogue: Catalogue) -> Catalogue:
     """The catalogue for a joint whose inertia and weight are known from the body.
 
-    There an actuator's gain is not just calibration, and a spring may have any rest position.
+    There an actuator's gain is not just calibration, and a spring may have any rest position: `at_joint` of the elements.
     """
-    found = dict(catalogue.elements)
-    if (gain := found.get("actuator_gain")) is not None:
-        found[gain.name] = replace(gain, candidate=True, starts=lambda _: [{"gain": one} for one in GAINS])
-    if (spring := found.get("linear_spring")) is not None:
-        found[spring.name] = replace(
-            spring,
-            starts=lambda s: [
-                {"stiffness": STIFFNESS * s.effort / s.position, "rest_length": rest}
-                for rest in (s.low, s.centre, s.high)
-            ],
-        )
-    if (limit := found.get("reference_rate_limit")) is not None:
-        found[limit.name] = replace(limit, starts=lambda s: [{"rate": one * s.velocity} for one in RATES])
-    if (hold := found.get("command_hold")) is not None:
-        found[hold.name] = replace(
-            hold, starts=lambda s: [{"period": 1.0 / rate} for rate in CLOCKS if 4.0 * s.frequency < rate]
-        )
-    # the friction model of simulated robots
-    if (friction := found.get("soft_constraint_friction")) is not None:
-        found[friction.name] = replace(friction, candidate=True)
-    if (
-        constant := found.get("constant_force")
-    ) is not None:  # a spring at rest far from the motion acts like a constant force
-        found[constant.name] = replace(constant, special_case_of=(*constant.special_case_of, "linear_spring"))
-    return Catalogue(found)
+    elements = catalogue.elements.items()
+    return Catalogue({name: replace(one, **one.at_joint) if one.at_joint else one for name, one in elements})
 
 
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other

@@ -24,6 +24,7 @@ ELEMENT = Element(
     absent=1.0,
     candidate=False,  # equivalent to another mass, damping and stiffness
     starts=lambda s: [{"gain": 1.02}],
+    at_joint={"candidate": True, "starts": lambda _: [{"gain": 0.9}, {"gain": 1.1}]},
     also_known_as=("force constant", "motor constant error"),
     family="calibration",
     confusable={

@@ -19,6 +19,10 @@ def delay_of(stamps, period):
     return np.maximum(ticks * period - stamps, 0.0)
 
 
+# [Hz] usual rates at which drives and buses take a new command
+RATES = (500.0, 400.0, 250.0, 200.0, 125.0, 100.0, 80.0, 60.0, 50.0, 40.0, 30.0, 25.0, 20.0, 10.0, 5.0, 1.0)
+
+
 ELEMENT = Element(
     name="command_hold",
     slot="command",
@@ -28,29 +32,13 @@ ELEMENT = Element(
     delay=delay_of,
     size="period",
     clock="period",
-    # usual rates of drives and buses, from twice the sample period to a quarter of the motion's period
+    # from twice the sample period to a quarter of the motion's period
     starts=lambda s: [
-        {"period": 1.0 / rate}
-        for rate in (
-            500.0,
-            400.0,
-            250.0,
-            200.0,
-            125.0,
-            100.0,
-            80.0,
-            60.0,
-            50.0,
-            40.0,
-            30.0,
-            25.0,
-            20.0,
-            10.0,
-            5.0,
-            1.0,
-        )
-        if 1.5 * s.period < 1.0 / rate < 0.25 / s.frequency
+        {"period": 1.0 / rate} for rate in RATES if 1.5 * s.period < 1.0 / rate < 0.25 / s.frequency
     ],
+    at_joint={  # faster ones do not show at the rates of records
+        "starts": lambda s: [{"period": 1.0 / rate} for rate in RATES[4:14] if 4.0 * s.frequency < rate]
+    },
     also_known_as=("zero-order hold", "down-sampled command", "bus cycle"),
     family="sampling",
     confusable={

@@ -34,6 +34,9 @@ ELEMENT = Element(
     starts=lambda s: [
         {"rate": w * (s.reference or s.position) * tau * s.frequency} for w in (1.0, 2.0, 4.0, 8.0)
     ],
+    at_joint={  # if the limit acts most of the time, the reference and the joint move at that rate
+        "starts": lambda s: [{"rate": share * s.velocity} for share in (0.7, 1.0, 1.4, 2.0, 2.8, 4.0)]
+    },
     also_known_as=("set-point ramp", "speed limit of a servo", "slew-rate limit"),
     family="command nonlinearity",
     confusable={

@@ -21,6 +21,12 @@ ELEMENT = Element(
     kernel=kernel,
     size="stiffness",
     starts=lambda s: [{"stiffness": 0.1 * s.stiffness, "rest_length": s.centre}],
+    at_joint={  # it may rest anywhere, and a tenth of the effort moves the joint against it
+        "starts": lambda s: [
+            {"stiffness": 0.1 * s.effort / s.position, "rest_length": rest}
+            for rest in (s.low, s.centre, s.high)
+        ]
+    },
     also_known_as=("Hooke spring",),
     family="stiffness",
     special_case_of=("bouc_wen_hysteresis", "elastoplastic_hysteresis"),  # for z_y far above the travel

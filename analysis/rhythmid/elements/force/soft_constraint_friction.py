@@ -64,6 +64,7 @@ ELEMENT = Element(
         "lead": (NEAR_LEAD[0] * LEAD, NEAR_LEAD[1] * LEAD),
     },
     candidate=False,
+    at_joint={"candidate": True},  # the friction model of simulated robots
     also_known_as=("frictionloss", "regularised constraint"),
     family="friction",
     confusable={
