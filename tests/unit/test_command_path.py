@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rhythmid.diagnose.answer.command_path import equivalents_in_command_path, with_equivalents
+from rhythmid.diagnose.answer.compose_effort import equivalents_in_command_path, with_equivalents
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record

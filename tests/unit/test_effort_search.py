@@ -14,8 +14,8 @@ from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.kin import contained
 from rhythmid.diagnose.effort.reference import Mapped, reference_of, residual_with_map
 from rhythmid.diagnose.effort.remainder import remainder_of
+from rhythmid.diagnose.effort.run import small_effects
 from rhythmid.diagnose.effort.search import EffortSearch, search_effort
-from rhythmid.diagnose.effort.small_effects import small_effects
 from rhythmid.diagnose.evidence import predict
 from rhythmid.diagnose.rejections import RULES, SHAPES, Claim, Rejection, rejections_of
 from rhythmid.identify.inverse_dynamics.balance import Balance

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import firwin, lfilter
 
-from rhythmid.diagnose.effort.lasting_error import PAST, lasting_share
+from rhythmid.diagnose.effort.run import PAST, lasting_share
 from rhythmid.diagnose.effort.search import GAP
 
 ROWS = 1200

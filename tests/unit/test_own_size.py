@@ -6,7 +6,7 @@ from typing import Any, cast
 import pytest
 
 from machines import CATALOGUE, hopper
-from rhythmid.diagnose.answer.own_size import own_sizes
+from rhythmid.diagnose.answer.effect_notes import own_sizes
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.identify.output_error import Fit
 

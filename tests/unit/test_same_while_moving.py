@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.answer.same_while_moving import same_while_moving
+from rhythmid.diagnose.answer.effect_notes import same_while_moving
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
 from rhythmid.simulation.effect import Path, effect_along

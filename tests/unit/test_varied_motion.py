@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.answer.varied_motion import motion_varying
+from rhythmid.diagnose.answer.compose_effort import motion_varying
 from rhythmid.diagnose.effort.reference import HISTORY
 from rhythmid.diagnose.effort.remainder import remainder_of
 

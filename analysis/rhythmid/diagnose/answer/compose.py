@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.diagnose.answer.effect_notes import own_sizes, same_while_moving
 from rhythmid.diagnose.answer.next_experiment import next_experiment
-from rhythmid.diagnose.answer.own_size import own_sizes
 from rhythmid.diagnose.answer.result import (
     Alternative,
     Curve,
@@ -23,7 +23,6 @@ from rhythmid.diagnose.answer.result import (
     Scored,
     settled,
 )
-from rhythmid.diagnose.answer.same_while_moving import same_while_moving
 from rhythmid.diagnose.answer.wording import (
     freed_value,
     location_of,

@@ -1,14 +1,12 @@
 """Compose the answer from the results of effort scoring."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from rhythmid.diagnose.answer.command_path import equivalents_in_command_path, with_equivalents
 from rhythmid.diagnose.answer.compose import explanations, held_out_words, missing_effects, remainder_of
+from rhythmid.diagnose.answer.effect_notes import same_while_moving
 from rhythmid.diagnose.answer.result import Detection, Diagnosis, Estimate, FitQuality, Scored, settled
-from rhythmid.diagnose.answer.same_while_moving import same_while_moving
-from rhythmid.diagnose.answer.varied_motion import motion_varying
 from rhythmid.diagnose.answer.wording import (
     freed_value,
     listed,
@@ -20,16 +18,32 @@ from rhythmid.diagnose.answer.wording import (
 from rhythmid.diagnose.case import Case, Untried
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.found_delay import delay_told, found_delay
+from rhythmid.diagnose.effort.reference import HISTORY
+from rhythmid.diagnose.effort.remainder import SPEED_OF
 from rhythmid.diagnose.effort.run import EffortResult
 from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.diagnose.verdict_rules import LONGER_DELAY
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import variation_of
+from rhythmid.model import Model
+from rhythmid.record.record import Record
 from rhythmid.record.separate_zeros import separate_zeros_notes
 
 NO_SENSOR = "The measurement is assumed to be the motion: effects in the sensor and in the measurement's time are not among the candidates."
 SAME_HERE = "it acts on the recorded command, beside which nothing drives, as the actuator's law does"
 FIXED_SCALE = "The recorded effort is taken to be true in scale."
+# each varies its quantity over the whole range and leaves the others as they are, so that they cannot stand for it
+MOTIONS = {
+    "velocity": "constant speeds from the slowest to the fastest, in both directions, over the same travel and with the same load",
+    "position": "one slow constant speed over the whole travel, there and back, with the same load",
+    "acceleration": "the same path at several accelerations up to the largest, with the same load",
+    "load": "the same motion with several loads, from none to the largest",
+    "time": "the same short motion from a cold start, repeated until the effort no longer changes",
+    HISTORY: "reversals after short and after long strokes, at a slow and at a fast speed, with the same load",
+}
+Groups = tuple[tuple[str, ...], ...]
 
 
 def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Diagnosis:
@@ -136,3 +150,43 @@ def _next_experiment(result: EffortResult) -> str:
     if left.significant and left.goes_with is not None:
         return motion_varying(left.goes_with)
     return "motion with more varied speed, load and position"
+
+
+def motion_varying(quantity: str) -> str:
+    """The motion that varies the quantity of a remaining effort, as `remainder_of` or a map names it, and why."""
+    if quantity.startswith(SPEED_OF):
+        other = quantity.removeprefix(SPEED_OF)
+        motion = f"{other} moved alone at several constant speeds while this joint is held"
+    else:
+        motion = MOTIONS[quantity]
+    return f"{motion}: the effort that is left depends on {quantity}"
+
+
+def equivalents_in_command_path(
+    records: Sequence[Record], model: Model, catalogue: Catalogue
+) -> Mapping[str, str]:
+    """The element of the command path that does here what one of the actuator does, by the name of that one.
+
+    A lag of the command and one of the actuator differ in what else drives: a forcing on the robot passes through the actuator
+    alone. Where nothing else drives, they are one law. An effort that was measured has the command path behind it, and shows nothing of it.
+    Two elements do the same where they share a kernel.
+    """
+    commanded = all(
+        one.input is not None and one.hold == "zero" and one.effort is None and one.forcing is None
+        for one in records
+    )
+    if not commanded or controlled(model):
+        return {}
+    of_command = {one.kernel: one.name for one in catalogue.values() if one.slot == "command" and one.kernel}
+    return {
+        one.name: of_command[one.kernel]
+        for one in catalogue.values()
+        if one.slot == "actuator" and one.kernel is not None and one.kernel in of_command
+    }
+
+
+def with_equivalents(groups: Groups, named: Sequence[str], equivalents: Mapping[str, str]) -> Groups:
+    """The groups of indistinguishable laws, with the equivalents of those that are named."""
+    found = [(*group, *(equivalents[name] for name in group if name in equivalents)) for group in groups]
+    alone = [name for name in named if name in equivalents and not any(name in group for group in groups)]
+    return (*found, *((name, equivalents[name]) for name in alone))

@@ -1,5 +1,6 @@
 """Diagnosis by the recorded effort: the search, the evaluation on data that no fit has seen, and the decision."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -10,19 +11,21 @@ from numpy.typing import NDArray
 from rhythmid.deadline import deadline
 from rhythmid.diagnose.case import SEARCHED, Case
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT, UNNAMED_EFFORT
+from rhythmid.diagnose.discrepancy import mean_product
+from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
 from rhythmid.diagnose.effort.fitted import Fitted, odds_at_rest
-from rhythmid.diagnose.effort.lasting_error import lasting_share
 from rhythmid.diagnose.effort.reference import (
     HISTORY,
     Mapped,
     beyond_noise,
     history_of,
+    map_columns,
     reference_of,
     residual_with_map,
 )
 from rhythmid.diagnose.effort.remainder import Curve, remainder_of
+from rhythmid.diagnose.effort.scales import scales_at
 from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
-from rhythmid.diagnose.effort.small_effects import small_effects
 from rhythmid.diagnose.evidence import (
     Blocks,
     CrossValidated,
@@ -42,12 +45,15 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import variation_of
+from rhythmid.identify.inverse_dynamics.estimate import size_of, variation_of
+from rhythmid.identify.inverse_dynamics.free_map import FreeMap
 from rhythmid.identify.inverse_dynamics.motion_noise import noise_power
-from rhythmid.identify.robust_covariance import with_robust_std
+from rhythmid.identify.robust_covariance import root_weights, weighted, with_robust_std
 
 Array = NDArray[np.float64]
 K = TypeVar("K")
+PAST = 8  # past errors that predict the next one: two periods of the filter's cut-off, at 2.5 rows a period and more
+LEAST_ROWS = 4 * PAST  # minimum rows of a record
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,3 +232,57 @@ def _among_models(
     std = fit.std.copy()  # the alignment comes first and belongs to no model
     std[1:] = np.hypot(std[1:], np.sqrt(np.diag(between)))
     return replace(chosen, fit=replace(fit, std=np.hypot(std, small_effects(balance, chosen, catalogue))))
+
+
+def small_effects(balance: Balance, chosen: Fitted, catalogue: Catalogue) -> Array:
+    """Standard deviations (p,) of the fit's parameters due to small effects that it lacks.
+
+    The effects are those of the catalogue and any function of the motion.
+    """
+    fit = chosen.fit
+    sizes = scales_at(balance, fit)
+    starts = [one for one in starts_of(catalogue, fit.model, sizes, balance) if one.kind == "effects"]
+    changes = columns_of(balance, fit, [one.start for one in screen(balance, fit, starts)])
+    rows = weighted(fit, fit.correlation)
+    free = map_columns(balance, chosen, FreeMap(list(balance.motions), size_of(balance)))
+    root = root_weights(fit, fit.correlation)
+    changes = np.hstack([changes, free]) * root[:, None]
+    signal = float(np.linalg.norm((balance.measured - balance.measured.mean()) * root))
+    errors = mean_product(rows.columns, rows.residual, changes, rows.inverse, signal)
+    std = np.zeros(len(fit.std))
+    std[rows.inside] = np.sqrt(np.diag(errors))
+    return std
+
+
+def lasting_share(error: Array, record: NDArray[np.int64], memory: int) -> float:
+    """Share of an error's rms that is predicted by errors `memory` rows and more before it; 0 where nothing is.
+
+    Filtered noise is correlated over the length of the filter, and no further. An error that follows from earlier ones is not
+    noise: it shows that the model lacks something. The prediction is linear. Each half of every record is predicted with the coefficients of the other halves, so that a
+    chance correlation predicts nothing.
+
+    Parameters
+    ----------
+    error : (n,) predicted less recorded, at neighbouring rows.
+    record : (n,) record of each row, in order.
+    memory : rows over which the filter mixes neighbours.
+    """
+    past, now, fold = [], [], []
+    for number in np.unique(record):
+        one = error[record == number]
+        if len(one) < LEAST_ROWS + memory:
+            continue
+        windows = np.lib.stride_tricks.sliding_window_view(one[:-memory], PAST)
+        later = one[PAST + memory - 1 :]
+        past.append(windows)
+        now.append(later)
+        fold.append(2 * np.arange(len(later)) // len(later))
+    if not now:
+        return 0.0
+    x, y, of = np.vstack(past), np.concatenate(now), np.concatenate(fold)
+    left = 0.0
+    for out in (of == 0, of == 1):
+        coefficients = np.linalg.lstsq(x[~out], y[~out], rcond=None)[0]
+        left += float(np.sum((y[out] - x[out] @ coefficients) ** 2))
+    whole = float(y @ y)
+    return math.sqrt(max(1.0 - left / whole, 0.0)) if whole > 0.0 else 0.0

@@ -8,8 +8,8 @@ from rhythmid.body.inertial_parameter import split
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.compose import sizes_told
 from rhythmid.diagnose.answer.compose_effort import FIXED_SCALE
+from rhythmid.diagnose.answer.effect_notes import same_while_moving
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
-from rhythmid.diagnose.answer.same_while_moving import same_while_moving
 from rhythmid.diagnose.constants import BLIND, STATED
 from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.diagnose.hypothesis import Verdict
@@ -67,7 +67,7 @@ def compose_machine(
         if label.removeprefix(f"{BODY}.") not in links
     ]
     missing = once([_effect(machine, found[joint], answers[joint], label) for joint, label in open_])
-    missing += [_link(machine, one, _of_same_link(one, links), answers) for one in links.values()]
+    missing += [_link(machine, one, links, answers) for one in links.values()]
     if tilt is not None:
         missing.append(_of_base(tilt, answers[tilt.shown]))
     missing += [_of_gear(one, answers[joint]) for joint, one in (gears or {}).items()]
@@ -203,27 +203,22 @@ def _gain(one: JointResult) -> float:
     return (before - after) / size
 
 
-def _of_same_link(wrong: WrongLink, links: Mapping[str, WrongLink]) -> list[WrongLink]:
-    """The corrected values of a link, this one among them.
-
-    Several of them together say that the inertia of the link is not the file's, and leave open in which of its ten parameters.
-    """
-    link = split(wrong.parameter)[0]
-    return [one for one in links.values() if split(one.parameter)[0] == link]
-
-
 def _link(
-    machine: Machine, wrong: WrongLink, same: Sequence[WrongLink], answers: Mapping[str, Diagnosis]
+    machine: Machine, wrong: WrongLink, links: Mapping[str, WrongLink], answers: Mapping[str, Diagnosis]
 ) -> JointEffect:
-    """A link's mass, inertia, centre of mass or payload, with what it explains of the joint that shows it best; `same` are all corrected values
-    of the link, which share the probability."""
+    """A link's mass, inertia, centre of mass or payload, with what it explains of the joint that shows it best.
+
+    All corrected values of the link share the probability: together they say that its inertia is not the file's, and leave open in which of its
+    ten parameters.
+    """
     name, kind = split(wrong.parameter)
+    same = sum(split(parameter)[0] == name for parameter in links)
     element = OF_LINKS[kind]
     slot, equation, _ = EQUATIONS[element]
     _, gain = _explained_at(answers[wrong.shown])
     return JointEffect(
         machine.body.joint_of(name), element, slot, equation, wrong.share,
-        wrong.probability / (len(same) + len(wrong.alike)), wrong.told(machine.body), gain, name,
+        wrong.probability / (same + len(wrong.alike)), wrong.told(machine.body), gain, name,
         wrong.probability, () if wrong.together is None else wrong.together.links,
     )  # fmt: skip
 

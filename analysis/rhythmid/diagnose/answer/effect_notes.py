@@ -1,4 +1,4 @@
-"""Sizes that one explanation determines, and that other explanations put elsewhere."""
+"""Notes about the effects that an answer names."""
 
 from collections.abc import Mapping
 
@@ -6,6 +6,7 @@ from rhythmid.diagnose.constants import VAGUE
 from rhythmid.diagnose.size_error import departure
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.identify.output_error import Fit
+from rhythmid.model import Term
 from rhythmid.report.quantity import with_std, with_written_unit
 
 
@@ -36,3 +37,21 @@ def own_sizes(decision: Decision, fit: Fit, size_errors: Mapping[str, float]) ->
                 "deviation of the answer contains other sizes of those effects, and other explanations, which may scale all forces otherwise."
             )
     return tuple(found)
+
+
+def same_while_moving(term: Term | None, where: str = "") -> tuple[str, ...]:
+    """A sentence with the sizes of other effects that give the same force while the machine moves, so that only its rests separate them.
+
+    Empty for an effect of which none are known. `where` is the joint of a machine.
+    """
+    if term is None or term.element.moving_as is None:
+        return ()
+    unit = next(value.unit for name, value in term.values.items() if name == term.element.size)
+    others = " and ".join(
+        f"{name} of {with_written_unit(f'{size:.3g}', unit)}"
+        for name, size in term.element.moving_as(**term.numbers)
+    )
+    return (
+        f"{where}{term.label}: while the machine moves this is the same as {others}, such as a weight or a zero of the effort. Only rests "
+        "under several efforts separate them.",
+    )
