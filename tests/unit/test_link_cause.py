@@ -42,7 +42,7 @@ def searched(plant: Machine, nominal: Machine, laws: tuple[str, ...] = ()) -> Se
 def changes(arm: Machine, link: str) -> list[LinkChange]:
     balances, records, _ = searched(arm, arm)
     weights = columns_of(balances, link)
-    return [LinkChange(balances, records, link, kind, weights) for kind in kinds_of(balances, link)]
+    return [LinkChange(balances, records, weights, link, kind) for kind in kinds_of(balances, link)]
 
 
 def test_every_change_of_a_link_is_a_body_that_can_exist_and_acts_with_its_ten_numbers(arm: Machine):

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rhythmid.diagnose.joints.stated_fit import stated_fit, stated_parameters
+from rhythmid.diagnose.joints.stated import stated_fit, stated_parameters
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from rhythmid.body.robot_file import FREE
 from rhythmid.diagnose.answer.result import Estimate
-from rhythmid.diagnose.constants import CONTRADICTS, HOLDS
+from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.joints.joint_case import JointResult
-from rhythmid.diagnose.joints.machine_cause import Columns, WeightedRows, pulled, rows_of, worth_it
+from rhythmid.diagnose.joints.machine_cause import Columns, LinearCause, WeightedRows, rows_of, worth_it
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
@@ -36,7 +36,7 @@ class BaseTilt:
 
     `angles` (k,) [rad] are rotations of gravity towards the `directions` (k, 3), unit vectors across the file's `given` gravity (3,) [m/s^2],
     with their `covariance` (k, k); k is 1 where the efforts do not say of the other direction, and `open` (3,) is that direction.
-    `weight` is the log odds of all joints for it, `shown` the joint that shows it best.
+    `weight` is the log odds of all joints for it, from which the `probability` follows, `shown` the joint that shows it best.
     """
 
     given: Array
@@ -45,6 +45,7 @@ class BaseTilt:
     covariance: Array
     open: Array | None
     weight: float
+    probability: float = math.nan
     shown: str = ""
 
     @property
@@ -81,11 +82,6 @@ class BaseTilt:
         return np.zeros(3, dtype=bool) if self.open is None else np.abs(self.open) > math.sin(UNDETERMINED)
 
     @property
-    def probability(self) -> float:
-        """Probability that the base is tilted: from the odds, and from the chance that a name is right where all evidence is for it."""
-        return HOLDS / (1.0 + math.exp(-self.weight))
-
-    @property
     def words(self) -> str:
         """The tilt and what to write, as one clause."""
         angle = self.angle
@@ -117,13 +113,10 @@ def _slopes(given: Array, directions: Array, angles: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Turn:
+class _Turn(LinearCause):
     """Gravity turned towards `directions` (k, 3), as a cause of the machine as a whole; `weights` are the efforts per unit of gravity."""
 
-    balances: JointBalances
-    records: Sequence[JointRecord]
     directions: Array
-    weights: Columns
     least: float = -math.inf
 
     @property
@@ -140,12 +133,6 @@ class _Turn:
 
     def coordinates(self, numbers: Array) -> Array:
         return turned(self.given, self.directions, numbers) - self.given
-
-    def imposed(self, numbers: Array, paths: Mapping[str, Model]) -> JointBalances:
-        return pulled(self.balances, self.weights, self.coordinates(numbers))
-
-    def columns(self, now: JointBalances, numbers: Array, paths: Mapping[str, Model]) -> Columns:
-        return self.weights
 
     def in_place(self, numbers: Array, paths: Mapping[str, Model]) -> JointBalances:
         gravity = turned(self.given, self.directions, numbers)
@@ -167,12 +154,12 @@ def likely_tilt(
     directions, undetermined = directions_of(rows, body.gravity)
     if not len(directions):
         return None
-    best = worth_it(_Turn(balances, records, directions, weights), balances, found)
+    best = worth_it(_Turn(balances, records, weights, directions), balances, found)
     if best is None:
         return None
     tilt = BaseTilt(
-        body.gravity, directions, best.numbers, best.covariance, undetermined, best.weight, best.shown
-    )
+        body.gravity, directions, best.numbers, best.covariance, undetermined, best.weight, best.probability, best.shown
+    )  # fmt: skip
     return tilt if tilt.moved else None
 
 

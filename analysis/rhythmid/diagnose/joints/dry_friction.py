@@ -2,7 +2,7 @@
 
 import math
 
-from rhythmid.diagnose.effort.candidate import Start, extended, priors_of_effect, starts_of
+from rhythmid.diagnose.effort.candidate import extended, priors_of_effect, starts_of
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.diagnose.joints.joint_case import JointResult
@@ -19,10 +19,17 @@ def with_dry_friction(one: JointResult) -> list[Fitted]:
         return []
     model, aligned = nominal.fit.model, nominal.fit.alignment
     starts = starts_of(one.case.catalogue, model, scales_of(balance, model), balance)
-    for start in (one for one in starts if one.name == DRY and one.element is not None):
-        made = _fitted(nominal, one, start, aligned)
-        return [made] if made is not None else []
-    return []
+    start = next((start for start in starts if start.name == DRY), None)
+    if start is None:
+        return []
+    model, label = extended(model, start)
+    added = priors_of_effect(balance, model, label, aligned)
+    if any(not 0.0 < prior.std < math.inf for prior in added.values()):
+        return []
+    priors = {**nominal.priors, **added}
+    names = [name for name in model.free if name in priors]
+    fit = fit_effort(balance, model, names, priors, alignment=aligned)
+    return [Fitted.of((label,), "effects", fit, priors, balance)]
 
 
 def laws_found(one: JointResult) -> list[Fitted]:
@@ -37,16 +44,3 @@ def dry_in_place(one: JointResult, law: Fitted) -> Fitted:
     if len(terms) != 1 or terms[0] is None or terms[0].element.family != "friction":
         return law
     return next((fit for fit in laws_found(one) if fit.elements == (DRY,)), law)
-
-
-def _fitted(nominal: Fitted, one: JointResult, start: Start, aligned: float) -> Fitted | None:
-    balance = one.result.search.balance
-    model, label = extended(nominal.fit.model, start, 1.0)
-    added = priors_of_effect(balance, model, label, aligned)
-    if any(not 0.0 < prior.std < math.inf for prior in added.values()):
-        return None
-    priors = {**nominal.priors, **added}
-    fit = fit_effort(
-        balance, model, [name for name in model.free if name in priors], priors, alignment=aligned
-    )
-    return Fitted.of((label,), "effects", fit, priors, balance)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.joints.joint_case import JointResult
-from rhythmid.diagnose.joints.machine_cause import Columns, most_promising, worth_it
+from rhythmid.diagnose.joints.machine_cause import Columns, most_promising, side_by_side, worth_it
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.joints.elastic_gear import ElasticGear
 from rhythmid.identify.joints.joint_motion import JointBalances
@@ -116,12 +116,7 @@ class _Yielding:
                     for joint in self.balances.models
                 }
             )
-        return {
-            joint: [
-                np.concatenate(parts, axis=1) for parts in zip(*(one[joint] for one in made), strict=True)
-            ]
-            for joint in self.balances.models
-        }
+        return {joint: side_by_side(one[joint] for one in made) for joint in self.balances.models}
 
     def in_place(self, numbers: Array, paths: Mapping[str, Model]) -> JointBalances:
         return self._with(numbers, paths, True)

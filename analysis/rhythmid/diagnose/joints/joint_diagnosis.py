@@ -17,7 +17,6 @@ from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.case import EXPLAINED, SEARCHED, WEIGHED, Budget
 from rhythmid.diagnose.constants import STATED
-from rhythmid.diagnose.joints.augmented import augmented
 from rhythmid.diagnose.joints.base_tilt import BaseTilt, likely_tilt
 from rhythmid.diagnose.joints.equivalents import equivalent_names, equivalents
 from rhythmid.diagnose.joints.gear_compliance import GearCompliance, likely_gear
@@ -27,7 +26,7 @@ from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.link_cause import LIGHTEST, feels, likely_link
 from rhythmid.diagnose.joints.link_exchange import exchanged
 from rhythmid.diagnose.joints.misfit import braking, late_efforts, misfits
-from rhythmid.diagnose.joints.stated_fit import stated_parameters
+from rhythmid.diagnose.joints.stated import augmented, stated_parameters
 from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError

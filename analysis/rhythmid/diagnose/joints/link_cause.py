@@ -24,12 +24,13 @@ from rhythmid.diagnose.joints.link_group import masses_alike
 from rhythmid.diagnose.joints.machine_cause import (
     Beside,
     Columns,
+    LinearCause,
     Options,
     Weighed,
     best_beside,
     matters,
     options_of,
-    pulled,
+    side_by_side,
     weighed,
 )
 from rhythmid.diagnose.joints.wrong_link import WrongLink, values_of
@@ -49,14 +50,11 @@ LOWER = np.tril_indices(3)
 
 
 @dataclass(frozen=True, eq=False)
-class LinkChange:
+class LinkChange(LinearCause):
     """A kind of change of one link as a cause of the machine as a whole; `weights` are the efforts (n, 10) per unit of each of the link's ten numbers."""
 
-    balances: JointBalances
-    records: Sequence[JointRecord]
     link: str
     kind: str
-    weights: Columns
 
     @property
     def own(self) -> Principal:
@@ -139,12 +137,6 @@ class LinkChange:
             return mass * point_mass(place) - before * point_mass(end)
         return self.ten(numbers) - self.own.ten
 
-    def imposed(self, numbers: Array, paths: Mapping[str, Model]) -> JointBalances:
-        return pulled(self.balances, self.weights, self.coordinates(numbers))
-
-    def columns(self, now: JointBalances, numbers: Array, paths: Mapping[str, Model]) -> Columns:
-        return self.weights
-
     def machine(self, numbers: Array) -> Machine:
         """The machine with these numbers."""
         machine, (link, kind) = self.balances.machine, (self.link, self.kind)
@@ -193,16 +185,12 @@ def ranked_changes(
     weights = {link: columns_of(balances, link) for link in links}
     options: dict[str, Options] = {}
     for joint, one in found.items():
-        together = [
-            np.concatenate(parts, axis=1)
-            for parts in zip(*(weights[link][joint] for link in links), strict=True)
-        ]
-        options[joint] = options_of(one, together)
+        options[joint] = options_of(one, side_by_side(weights[link][joint] for link in links))
     made: list[Ranked] = []
     for place, link in enumerate(links):
         own = {joint: one.of(slice(NUMBERS * place, NUMBERS * (place + 1))) for joint, one in options.items()}
         for kind in kinds_of(balances, link):
-            change = LinkChange(balances, records, link, kind, weights[link])
+            change = LinkChange(balances, records, weights[link], link, kind)
             beside = best_beside(own, change)
             made.append(Ranked(change, beside, beside.gain - decisive(1) * len(beside.numbers)))
     return sorted(made, key=lambda one: -one.worth)

@@ -19,7 +19,7 @@ from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.diagnose.joints.joint_case import JointResult
 from rhythmid.diagnose.joints.link_cause import NUMBERS, LinkChange, columns_of, kinds_of
 from rhythmid.diagnose.joints.link_evidence import laws_of
-from rhythmid.diagnose.joints.machine_cause import SETTLED, refined, rows_of
+from rhythmid.diagnose.joints.machine_cause import SETTLED, refined, rows_of, side_by_side
 from rhythmid.diagnose.joints.wrong_link import WrongLink, values_of
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.joints.joint_motion import JointBalances
@@ -92,10 +92,7 @@ def exchanged(
     before = np.concatenate([_ten(corrected, link) - _ten(body, link) for link in weights])
     rows = []
     for joint, one in found.items():
-        every = [
-            np.concatenate(parts, axis=1)
-            for parts in zip(*(weights[link][joint] for link in weights), strict=True)
-        ]
+        every = side_by_side(of_link[joint] for of_link in weights.values())
         law = one.result.chosen if one.result.chosen in laws_of(one) else one.result.nominal
         left, columns = rows_of(one.result.search.balance, law.fit, every, one.result.chosen.fit.residual)
         triangle = np.asarray(np.linalg.qr(np.column_stack([columns, left - columns @ before]), mode="r"))
@@ -104,7 +101,7 @@ def exchanged(
     price = max(decisive(one.result.contest.candidates) for one in found.values())
     price += math.log(sum(map(len, kinds.values())))
     single = {
-        (link, kind): LinkChange(given, records, link, kind, weights[link])
+        (link, kind): LinkChange(given, records, weights[link], link, kind)
         for link in weights
         for kind in kinds[link]
     }

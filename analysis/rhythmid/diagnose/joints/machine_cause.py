@@ -5,7 +5,7 @@ the search costs, and the odds of each of its numbers; and what it explains at s
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -25,6 +25,7 @@ from rhythmid.identify.inverse_dynamics.estimate import EffortFit, fit_effort, v
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.student import autocorrelation_time, scale_of
 from rhythmid.model import Model
+from rhythmid.record.joint_record import JointRecord
 
 Array = NDArray[np.float64]
 Columns = dict[str, list[Array]]  # by joint and motion, changes (n, p) of the effort
@@ -77,6 +78,40 @@ class Cause(Numbers, Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class LinearCause:
+    """A cause with whose coordinates (p,) the efforts of the `balances` change linearly, by these `weights` (n, p)."""
+
+    balances: JointBalances
+    records: Sequence[JointRecord]
+    weights: Columns
+
+    def coordinates(self, numbers: Array) -> Array:
+        """As for `Numbers`."""
+        raise NotImplementedError
+
+    def imposed(self, numbers: Array, paths: Mapping[str, Model]) -> JointBalances:
+        """The balances with these numbers; columns of links are left as they are."""
+        change = self.coordinates(numbers)
+        motions = {
+            joint: [
+                one if one.coupling is None else replace(one, coupling=one.coupling + weight @ change)
+                for one, weight in zip(made, self.weights[joint], strict=True)
+            ]
+            for joint, made in self.balances.motions.items()
+        }
+        return replace(self.balances, motions=motions)
+
+    def columns(self, now: JointBalances, numbers: Array, paths: Mapping[str, Model]) -> Columns:
+        """The weights, whatever the numbers are."""
+        return self.weights
+
+
+def side_by_side(columns: Iterable[Sequence[Array]]) -> list[Array]:
+    """Columns (n, p) of each motion of several causes as one array a motion."""
+    return [np.concatenate(parts, axis=1) for parts in zip(*columns, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
 class Weighed:
     """The numbers (k,) of a cause with their `covariance` (k, k), the `paths` of the joints that were fitted beside them, the log odds of all
     joints for it (`weight`), the joint that shows it best (`shown`), and what it explains of that joint's mismatch (`share`). `best` is the hypothesis of
@@ -109,11 +144,8 @@ def worth_it(
         return None
     options = {joint: options_of(one, columns[joint]) for joint, one in weighing.items()}
     beside = best_beside(options, cause).fits
-    numbers, made = np.zeros(len(cause.spreads)), []
-    for fits in ({}, beside):
-        one = weighed(cause, balances, found, weighing, numbers, fits)
-        numbers, made = one.numbers, [*made, one]
-    plain, richer = made
+    plain = weighed(cause, balances, found, weighing, np.zeros(len(cause.spreads)), {})
+    richer = weighed(cause, balances, found, weighing, plain.numbers, beside)
     best = richer if richer.weight > plain.weight + decisive(1) else plain
     price = max(decisive(one.result.contest.candidates) for one in found.values())
     if best.weight <= price + decisive(1) * len(best.numbers):
@@ -177,11 +209,15 @@ def most_promising(
 
 def first_gain(cause: Cause, columns: Columns, found: Mapping[str, JointResult]) -> float:
     """Gain of log likelihood of a small cause beside the given paths of these joints, to first order."""
-    rows = [
-        rows_of(one.result.search.balance, one.result.nominal.fit, columns[joint])
-        for joint, one in found.items()
-    ]
-    return _gained(rows, cause)
+    slopes = cause.slopes
+    normal, slope = np.zeros((len(slopes), len(slopes))), np.zeros(len(slopes))
+    for joint, one in found.items():
+        left, of_cause = rows_of(one.result.search.balance, one.result.nominal.fit, columns[joint])
+        own = of_cause @ slopes.T
+        normal += own.T @ own
+        slope += own.T @ left
+    change = np.maximum(-np.linalg.solve(normal + np.diag(cause.spreads**-2), slope), cause.least)
+    return -0.5 * float(slope @ change)
 
 
 def rows_of(
@@ -190,18 +226,6 @@ def rows_of(
     """What a fitted path leaves of the effort, and the columns (n, p) of a cause, in units of the noise."""
     made = balance.rows(columns, balance.later(fit.model, fit.alignment))
     return in_units_of_noise(fit.residual, made, fit.jacobian, balance.record, noise)
-
-
-def _gained(rows: Sequence[WeightedRows], cause: Cause) -> float:
-    """Gain of log likelihood of a small cause beside the given paths, to first order."""
-    slopes = cause.slopes
-    normal, slope = np.zeros((len(slopes), len(slopes))), np.zeros(len(slopes))
-    for left, columns in rows:
-        own = columns @ slopes.T
-        normal += own.T @ own
-        slope += own.T @ left
-    change = np.maximum(-np.linalg.solve(normal + np.diag(cause.spreads**-2), slope), cause.least)
-    return -0.5 * float(slope @ change)
 
 
 @dataclass(frozen=True, eq=False)
@@ -374,15 +398,3 @@ def matters(now: JointBalances, before: JointBalances, found: Mapping[str, Joint
         if math.sqrt(max(removed, 0.0)) > PRACTICAL_EFFORT * variation_of(balance):
             return True
     return False
-
-
-def pulled(balances: JointBalances, weights: Columns, change: Array) -> JointBalances:
-    """The balances after this `change` (p,) of coordinates with these `weights` (n, p) on the efforts; columns of links are left as they are."""
-    motions = {
-        joint: [
-            motion if motion.coupling is None else replace(motion, coupling=motion.coupling + weight @ change)
-            for motion, weight in zip(made, weights[joint], strict=True)
-        ]
-        for joint, made in balances.motions.items()
-    }
-    return replace(balances, motions=motions)
