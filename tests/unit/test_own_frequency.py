@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from machines import CATALOGUE
-from rhythmid.diagnose.search.own_frequency import own_frequency
+from rhythmid.diagnose.search.round import own_frequency
 from rhythmid.elements.element import Scales
 
 SIZES = Scales(

@@ -5,7 +5,7 @@ import pytest
 
 from machines import CATALOGUE
 from rhythmid.diagnose.diagnosis import diagnose
-from rhythmid.diagnose.search.parts import in_parts
+from rhythmid.diagnose.search.proposals import in_parts
 from rhythmid.diagnose.search.round import Round
 from rhythmid.diagnose.search.score_tests import Score
 from rhythmid.diagnose.search.trial import Trial

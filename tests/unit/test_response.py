@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rhythmid.diagnose.free_functions import free_functions
-from rhythmid.diagnose.search.response import response
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
 from rhythmid.diagnose.search.tangent import Tangent
 from rhythmid.elements.catalogue import load_catalogue
@@ -54,7 +53,7 @@ def by_difference(known: Trajectories, force: np.ndarray, share: float) -> np.nd
 
 
 def test_over_a_hundred_free_cycles_the_answer_is_that_to_a_tiny_force(swinging):
-    made = response(swinging, 0, friction(swinging))
+    made = swinging.response(0, friction(swinging))
     assert made is not None and apart(made, by_difference(swinging, friction(swinging), 1e-6)) < 0.01
     rough = by_difference(swinging, friction(swinging), 1.0)
     assert apart(made, rough) > 0.2  # a part that is too large tells something else
@@ -94,7 +93,7 @@ def test_the_answer_of_a_driven_machine_is_that_to_a_tiny_force_whatever_is_meas
     fit = start_only(model, series, WHITE, 0.005)
     known = trajectories(fit)
     force = rng.standard_normal(len(known.paths[0].time))
-    made = response(known, 0, force)
+    made = known.response(0, force)
     assert known.tangents[0] is not None
     assert made is not None and apart(made, by_difference(known, force, 1e-6)) < 0.01
 
@@ -118,15 +117,15 @@ command:
     )
     known = trajectories(start_only(model, prepare([record]), WHITE, 0.005))
     force = np.sin(5.0 * known.paths[0].time)
-    made = response(known, 0, force)
+    made = known.response(0, force)
     assert known.tangents == (None,)
     assert made is not None and apart(made, by_difference(known, force, 1e-4)) < 0.02
 
 
 def test_twice_the_force_does_twice_as_much_and_none_does_nothing(swinging):
-    once, twice = (response(swinging, 0, share * friction(swinging)) for share in (1.0, 2.0))
+    once, twice = (swinging.response(0, share * friction(swinging)) for share in (1.0, 2.0))
     assert once is not None and twice is not None and apart(twice, 2.0 * once) < 0.05
-    none = response(swinging, 0, np.zeros(len(friction(swinging))))
+    none = swinging.response(0, np.zeros(len(friction(swinging))))
     assert none is not None and not none.any()
 
 
@@ -140,5 +139,5 @@ def test_an_answer_whose_squares_would_overflow_is_none(swinging):
     stiff = replace(swinging)
     stiff.__dict__["tangents"] = (Tangent(maps, 0.0),)
     assert 1e150 < np.abs(stiff.tangents[0].response(np.ones(count))).max() < np.inf
-    assert response(stiff, 0, np.ones(count)) is None
+    assert stiff.response(0, np.ones(count)) is None
     assert not np.any(next(free_functions(stiff)).columns)

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.signal import lfilter
 
-from rhythmid.diagnose.search.response import response
 from rhythmid.diagnose.search.score_tests import Trajectories, residual_line
 from rhythmid.parallel import each
 
@@ -121,7 +120,7 @@ def _simulated(
     def one(function: list[Array]) -> tuple[Array, ...]:
         changes = []
         for index, series in enumerate(known.disturbed.series):
-            change = response(known, index, function[index])
+            change = known.response(index, function[index])
             changes.append(np.zeros(series.blocks) if change is None else series.of_block(change))
         return tuple(changes)
 

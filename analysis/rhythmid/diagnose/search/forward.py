@@ -16,13 +16,13 @@ from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.case import SEARCHED, Budget, Untried
 from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
-from rhythmid.diagnose.search.parts import in_parts
 from rhythmid.diagnose.search.proposals import (
     REFITTED,
     WORTH,
     better_of,
     follows_all,
     from_given,
+    in_parts,
     pair_proposals,
     proposals,
     refitted,

@@ -1,7 +1,7 @@
 """One round of the search: scores of the whole catalogue at a fit, along whole records and in short windows."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.case import Untried
 from rhythmid.diagnose.constants import PRACTICAL
 from rhythmid.diagnose.free_functions import filtered
-from rhythmid.diagnose.search.own_frequency import OWN_LINE, own_frequency
 from rhythmid.diagnose.search.pair_scores import PairScore, pair_scores, thinned
 from rhythmid.diagnose.search.score_tests import (
     Change,
@@ -19,7 +18,6 @@ from rhythmid.diagnose.search.score_tests import (
     Trajectories,
     best_changes,
     changes_of,
-    guesses,
     p_value,
     score,
     sizes_along,
@@ -28,7 +26,7 @@ from rhythmid.diagnose.search.score_tests import (
 )
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
-from rhythmid.elements.element import Scales
+from rhythmid.elements.element import Element, Scales
 from rhythmid.errors import InputError
 from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
@@ -46,6 +44,8 @@ WINDOWS = 40
 MOST_REMOVED = 60  # number of guesses whose effects are removed from a residual before its noise is estimated
 LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
 UNDERSTATED = 0.1  # smallest ratio of a score to the gain of the refit, far from the first guess
+# frequency resolutions within which two frequencies count as equal: spectral lines closer than their width cannot be separated
+OWN_LINE = 1.0
 REMEMBERED = 4  # minimum length of a window, in correlation times of the noise
 
 
@@ -171,6 +171,27 @@ def _separable(one: Score, sizes: Scales) -> bool:
     return own_frequency(one.element, one.values, sizes) >= OWN_LINE
 
 
+def own_frequency(element: Element, values: Mapping[str, float], sizes: Scales) -> float:
+    """Distance of a vibration, or of a resonance as narrow as a spectral line, from the forcing's harmonics, or of a free motion's frequencies.
+
+    In frequency resolutions of the records; infinite for other effects. At a multiple of the forcing's frequency it is equivalent to any change in the
+    path of the forcing, at that of a free motion to another damping or stiffness.
+    """
+    forcing, line = sizes.forcing_frequency, 1.0 / sizes.duration
+    free = forcing <= 0.0 and sizes.idle
+    if element.kernel is None or (forcing <= 0.0 and not free):
+        return math.inf
+    found = [values[one.name] for one in element.parameters if one.unit == "Hz"]
+    damping = values[element.width] if element.width else 0.0
+    low, high = min(sizes.frequency, sizes.swings[0] or math.inf), max(sizes.frequency, sizes.swings[1])
+    apart = [
+        max(low - f, f - high, 0.0) if free else abs(f - round(f / forcing) * forcing)
+        for f in found
+        if damping * f < line
+    ]
+    return min(apart, default=math.inf) / line
+
+
 def changes_at(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> Iterator[Change]:
     """Changes of the output by all first guesses of the catalogue, linearised at the fit."""
     return _changes_along(trajectories(fit), catalogue, pool)
@@ -179,7 +200,7 @@ def changes_at(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) 
 def _changes_along(
     known: Trajectories, catalogue: Catalogue, pool: ThreadPoolExecutor | None
 ) -> Iterator[Change]:
-    return changes_of(known, guesses(catalogue, known.fit.model, sizes_along(known)), pool)
+    return changes_of(known, candidates(catalogue, known.fit.model.setting, sizes_along(known)).tried, pool)
 
 
 def _noise_left(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> NoiseModel:

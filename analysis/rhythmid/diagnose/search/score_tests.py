@@ -19,10 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
-from rhythmid.diagnose.search.response import response
 from rhythmid.diagnose.search.tangent import Tangent, tangent
-from rhythmid.elements.candidates import candidates
-from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales
 from rhythmid.elements.first_guess import limited, rescaled
 from rhythmid.errors import InputError
@@ -42,6 +39,7 @@ from rhythmid.simulation.transport import delayed_command, delays, physical_time
 Array = NDArray[np.float64]
 # total number of block averages from which changes are stored in single precision, which suffices for a score
 FULL_PRECISION_ROWS = 200_000
+SMALL = 1e-3  # ratio of the applied part of a force to the force that moves the machine, at most
 
 
 @dataclass(frozen=True)
@@ -106,6 +104,26 @@ class Trajectories:
             tangent(self.disturbed, self.fit.model, index, states, self.push or 1.0)
             for index, states in enumerate(self.states)
         )
+
+    def response(self, index: int, force: Array) -> Array | None:
+        """First-order change (n,) of the measurement of series `index` at its block centres by a force (n,); None where the model diverges.
+
+        Computed by the tangent linear model. For a model that keeps a history, by the difference to a run with a small part of the force,
+        scaled back.
+        """
+        along = self.tangents[index]
+        change = self._by_difference(index, force) if along is None else along.response(force)
+        bounded = change is not None and float(np.abs(change).max()) < DIVERGED  # false for NaN, too
+        return change if bounded else None
+
+    def _by_difference(self, index: int, force: Array) -> Array | None:
+        fit, run, path = self.fit, self.disturbed, self.paths[index]
+        strength = float(np.sqrt(np.mean(force**2)))
+        if strength == 0.0:
+            return np.zeros(len(path.time))
+        share = min(1.0, SMALL * self.push / strength)
+        rows = run.rows(fit.model, index, fit.starts[index], first_order_hold(path.time, share * force))
+        return None if rows is None else (rows[:, run.states] - path.signal) / share
 
 
 def trajectories(fit: Fit) -> Trajectories:
@@ -204,7 +222,7 @@ def change_of_output(
             force = past_modifiers(force, model, path)
         if not float(np.abs(force).max()) < DIVERGED:  # true for NaN, too
             return None
-        change = response(known, index, force)
+        change = known.response(index, force)
         if change is None:
             return None
         changes.append(one.of_block(change))
@@ -259,11 +277,6 @@ def sizes_along(known: Trajectories) -> Scales:
         effort=max(float(np.std(effort)) for effort in efforts) or sizes.effort,
         peak_effort=max(float(np.abs(effort).max()) for effort in efforts),
     )
-
-
-def guesses(catalogue: Catalogue, model: Model, sizes: Scales) -> list[tuple[Element, dict[str, float]]]:
-    """First guesses of every element that may be missing from the model."""
-    return list(candidates(catalogue, model.setting, sizes).tried)
 
 
 def changes_of(
