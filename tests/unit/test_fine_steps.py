@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from machines import CATALOGUE, SHORT, hopper, records
-from rhythmid.diagnose.fine_steps import finely_stepped
+from rhythmid.diagnose.intervals import finely_stepped
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.identify.noise import NoiseModel

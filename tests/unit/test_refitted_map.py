@@ -5,8 +5,7 @@ import pytest
 
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.diagnose.contenders import linearised, rows_of
-from rhythmid.diagnose.location import dependences
-from rhythmid.diagnose.refitted_map import refitted_map
+from rhythmid.diagnose.location import dependences, refitted_map
 from rhythmid.diagnose.search.score_tests import trajectories
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.identify.noise import NoiseModel

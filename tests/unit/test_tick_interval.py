@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper, search_of
-from rhythmid.diagnose.tick_interval import ticks_followed
+from rhythmid.diagnose.intervals import ticks_followed
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.sample_clock.tick_likelihood import ticks_sought

@@ -18,12 +18,16 @@ from rhythmid.diagnose.evidence import Linearised, predict, weight_for
 from rhythmid.diagnose.free_functions import FreeFunction
 from rhythmid.diagnose.location import Reach, beside, following, reach_of
 from rhythmid.diagnose.rejections import decisive
+from rhythmid.diagnose.search.forward import search
 from rhythmid.diagnose.search.score_tests import under
+from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
+from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
+from rhythmid.progress import Tell
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,15 @@ class Seen:
         rows = rows_of(fit.run.series, (), noise)
         reach = reach_of(fit, rows, pool)
         return cls(fit, rows, reach, following(linearised(fit, rows), rows, reach))
+
+    @classmethod
+    def explained(
+        cls, fit: Fit, given: Model, catalogue: Catalogue, pool: ThreadPoolExecutor | None, tell: Tell
+    ) -> "Seen":
+        """The fit of the model `given`, with the effect of the catalogue that explains the records best."""
+        series = fit.run.series
+        known = catalogue.within(scales(series, fit.model))
+        return cls.of(search(series, fit, given, known, pool, tell, most=1).fit, pool)
 
     def extended(self, by: FreeFunction) -> Linearised:
         """The linearised fit with signals added to its output, each with a free coefficient."""

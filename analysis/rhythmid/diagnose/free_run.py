@@ -21,12 +21,10 @@ from rhythmid.diagnose.contenders import (
     rows_of,
 )
 from rhythmid.diagnose.evidence import detectable, prediction
-from rhythmid.diagnose.fine_steps import finely_stepped
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
-from rhythmid.diagnose.intervals import profiled
-from rhythmid.diagnose.location import Dependence, dependences
+from rhythmid.diagnose.intervals import finely_stepped, profiled, ticks_followed
+from rhythmid.diagnose.location import Dependence, dependences, refitted_map
 from rhythmid.diagnose.model_uncertainty import covariance_between
-from rhythmid.diagnose.refitted_map import refitted_map
 from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import EFFECTS_AT_ONCE, Search, search
 from rhythmid.diagnose.search.refit import reach_of, whole_fit
@@ -39,7 +37,6 @@ from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.size_error import size_errors, std_beside_others
 from rhythmid.diagnose.small_effects import small_effects
-from rhythmid.diagnose.tick_interval import ticks_followed
 from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.command_jitter import command_jitter, weighed

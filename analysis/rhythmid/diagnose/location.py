@@ -13,14 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.contenders import Rows, linearised
+from rhythmid.diagnose.contenders import Contender, Rows, contend, linearised
 from rhythmid.diagnose.evidence import CrossValidated, Linearised, cross_validate
-from rhythmid.diagnose.free_functions import FreeFunction, free_functions
+from rhythmid.diagnose.free_functions import SPLINED, FreeFunction, free_functions, values_of
+from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
+from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
+from rhythmid.diagnose.search.trial import Origin, Trial, propose
 from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.least_squares import column_norms
 from rhythmid.identify.output_error import Fit, rerun
+from rhythmid.identify.series import Series
 
 Array = NDArray[np.float64]
 RIDGE = 1e-4  # prior precision of a coefficient, relative to its information in all rows
@@ -174,3 +178,41 @@ def _coefficients(fit: Linearised, fitted: int) -> Array:
     normal = jacobian.T @ jacobian / np.outer(norms, norms) + np.diag(fit.precision / norms**2)
     pull = fit.precision * fit.departure / norms
     return -np.linalg.lstsq(normal, jacobian.T @ residual / norms + pull, rcond=1e-12)[0] / norms
+
+
+def refitted_map(
+    nominal: Trial,
+    before: Sequence[Dependence],
+    known: Trajectories,
+    series: Sequence[Series],
+    rows: Rows,
+    step: float,
+) -> tuple[str, Contender] | None:
+    """Fit the free map of the quantity on which the nominal model's residual depends most, like any other model.
+
+    The maps of `dependences` are first-order changes at a fit. They understate what another law would predict where the missing effect is
+    large, or where named effects have biased the model's own parameters to compensate for it. The prediction of the refitted map measures
+    what the names leave unexplained; the map itself is not a name.
+
+    Parameters
+    ----------
+    nominal : the fitted nominal model.
+    before : dependences of its residual on each quantity.
+    known : its run.
+    series, rows, step : the fitted series, the scored rows, and the largest integration step [s].
+
+    Returns the quantity and the fitted model, or None where no free function of one quantity predicts anything or the model
+    diverges with it.
+    """
+    best = max(
+        (one for one in before if one.quantity in SPLINED), key=lambda one: one.explained, default=None
+    )
+    if best is None or best.explained <= 0.0:
+        return None
+    name = SPLINED[best.quantity]
+    proposal = propose(
+        nominal.model, FREE_MAPS[name], [first_guess(np.concatenate(values_of(known, name)))], nominal.added
+    )
+    trials, _ = run_trials([proposal], series, Origin.of(nominal), rows.noise, step)
+    made = contend([(trial, "free_map") for trial in trials], series, rows, step)
+    return (best.quantity, made[0]) if made else None

@@ -18,7 +18,6 @@ from rhythmid.diagnose.baseline import Calibration
 from rhythmid.diagnose.calibration_evidence import Seen
 from rhythmid.diagnose.constants import FOLLOWS
 from rhythmid.diagnose.free_functions import FreeFunction
-from rhythmid.diagnose.search.forward import search
 from rhythmid.diagnose.search.restoring_force import is_restored
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
@@ -63,8 +62,7 @@ def with_zeros(
     if not alone.needs(alone.extended(_zero_of_each(alone.fit)), alone.base):
         return kept
     tell("the output's zero seems to differ from record to record; looking for an effect that says the same")
-    known = catalogue.within(scales(series, fit.model))
-    explained = Seen.of(search(series, fit, given, known, pool, tell, most=1).fit, pool)
+    explained = Seen.explained(fit, given, catalogue, pool, tell)
     both = explained.refitted(with_record_zero(explained.fit.model), others_marked(series), pool)
     if not explained.needs(both, explained.base, FOLLOWS):
         return kept

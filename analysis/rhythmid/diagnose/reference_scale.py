@@ -18,11 +18,9 @@ from rhythmid.diagnose.baseline import Calibration, calibrate
 from rhythmid.diagnose.calibration_evidence import Seen
 from rhythmid.diagnose.constants import FOLLOWS
 from rhythmid.diagnose.free_functions import FreeFunction
-from rhythmid.diagnose.search.forward import search
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit
-from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.progress import Tell
@@ -53,8 +51,7 @@ def with_reference_scale(
     ):
         return calibration
     tell("the measurement seems to be scaled; looking for an effect that says the same")
-    known = catalogue.within(scales(series, fit.model))
-    explained = Seen.of(search(series, fit, given, known, pool, tell, most=1).fit, pool)
+    explained = Seen.explained(fit, given, catalogue, pool, tell)
     law = explained.fit.model
     scaled = explained.refitted(_scaled(fit.model, catalogue), series, pool)
     shifted = explained.refitted(law.with_element(catalogue[OFFSET], {"offset": 0.0}), series, pool)
