@@ -16,6 +16,7 @@ from rhythmid.diagnose.constants import LONGEST_DELAY, SERIES
 from rhythmid.diagnose.free_functions import values_of
 from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
 from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.diagnose.search.order import CHAINS, passes_on
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.round import Round
 from rhythmid.diagnose.search.score_tests import Score, Trajectories
@@ -32,8 +33,6 @@ from rhythmid.simulation.right_hand_side import DRIVES
 from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
-# slots for a law whose only parameters are times
-SIGNALS: tuple[Slot, ...] = ("command", "actuator", "sensor")
 CLOCKS: tuple[Slot, ...] = ("command", "timing")  # slots for a delay that may drift
 LONGER = (2.0, 5.0, 12.0, 30.0)  # [samples] first guesses of a longer delay
 
@@ -207,14 +206,9 @@ def _places(element: Element) -> tuple[Slot, ...]:
     units = {parameter.unit for parameter in element.parameters}
     if element.delay is not None and units == {"1"}:
         return CLOCKS
-    plain = (
-        element.kernel is not None
-        and element.acts == Element.acts
-        and not element.memories
-        and not element.history
-    )
-    if plain and element.slot in SIGNALS and units == {"s"}:
-        return SIGNALS
+    plain = not element.memories and not element.history
+    if plain and passes_on(element) and units == {"s"}:
+        return CHAINS
     return ()
 
 

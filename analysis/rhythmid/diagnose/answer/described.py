@@ -1,13 +1,15 @@
 """Parts of a report that do not depend on how the records were scored: the nominal model and the elements."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
-from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.diagnose.answer.result import Diagnosis
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind
 from rhythmid.elements.element import SLOTS, Element
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.report.findings import ElementWords
-from rhythmid.report.record_quality import RecordQuality, quality_of
+from rhythmid.report.record_quality import quality_of
 
 REFITTED_NOMINAL = "refitted nominal model"
 # name of the final model beside the nominal one, by the kind of the chosen hypothesis
@@ -23,48 +25,56 @@ def labels_of(kind: Kind) -> tuple[str, str]:
     return REFITTED_NOMINAL, CHANGED.get(kind, "with the added effect")
 
 
-def listed(names: Sequence[str], most: int = 4) -> str:
+def described(
+    diagnosis: Diagnosis,
+    chosen: Hypothesis,
+    nominal: Model,
+    records: Sequence[Record],
+    holdout: Sequence[Record],
+    elements: Iterable[Element],
+    command: str,
+    name: str,
+) -> dict[str, Any]:
+    """Fields of `Findings` by name; `elements` are those that the report may mention, the other arguments are those of `present`."""
+    known = {one.name: one for one in elements}
+    slots = {slot: tuple(t.element.name for t in nominal.terms if t.element.slot == slot) for slot in SLOTS}
+    return {
+        "result": diagnosis.to_dict(),
+        "source": f"{name} against {_listed([record.name for record in records])}",
+        "slots": slots,
+        "chosen": chosen.names,
+        "output_unit": nominal.units.position,
+        "nominal": {
+            n: {"value": v.value, "std": None, "unit": v.unit} for n, v in nominal.parameters.items()
+        },
+        "records": tuple(
+            quality_of(one, role)
+            for group, role in ((records, "fit"), (holdout, "held out"))
+            for one in group
+        ),
+        "words": {key: _words_of(one) for key, one in known.items()},
+        "hints": tuple(_hints(diagnosis.indistinguishable, known)),
+        "command": command,
+    }
+
+
+def _listed(names: Sequence[str], most: int = 4) -> str:
     """Names joined to text; of more than `most` names, only the number of the last ones is given."""
     if len(names) > most:
         return f"{', '.join(names[: most - 1])} and {len(names) - most + 1} more records"
     return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
 
 
-def slots_of(nominal: Model) -> dict[str, tuple[str, ...]]:
-    """The nominal model's elements by slot."""
-    return {slot: tuple(t.element.name for t in nominal.terms if t.element.slot == slot) for slot in SLOTS}
+def _words_of(one: Element) -> ElementWords:
+    """The description of an element in the catalogue."""
+    parameters = {parameter.name: parameter.description for parameter in one.parameters}
+    return ElementWords(one.title, parameters, one.also_known_as, one.reference)
 
 
-def given_values(nominal: Model) -> dict[str, dict[str, float | str | None]]:
-    """The nominal model's parameters as given in its file."""
-    return {n: {"value": v.value, "std": None, "unit": v.unit} for n, v in nominal.parameters.items()}
-
-
-def qualities(records: Sequence[Record], holdout: Sequence[Record]) -> tuple[RecordQuality, ...]:
-    """Quality of the fitted and of the held-out records."""
-    roles = ((records, "fit"), (holdout, "held out"))
-    return tuple(quality_of(one, role) for group, role in roles for one in group)
-
-
-def words_of(elements: Iterable[Element]) -> dict[str, ElementWords]:
-    """Descriptions of these elements in the catalogue, by name."""
-    return {
-        e.name: ElementWords(
-            e.title, {p.name: p.description for p in e.parameters}, e.also_known_as, e.reference
-        )
-        for e in elements
-    }
-
-
-def hints_of(
-    groups: Sequence[Sequence[str]], elements: Iterable[Element]
-) -> tuple[tuple[str, str, str], ...]:
+def _hints(groups: Sequence[Sequence[str]], known: Mapping[str, Element]) -> Iterator[tuple[str, str, str]]:
     """What distinguishes the members of each group, as stated by the elements themselves."""
-    known: Mapping[str, Element] = {element.name: element for element in elements}
-    made = []
     for group in groups:
         for name in group:
             for other, words in known[name].confusable.items() if name in known else ():
                 if other in group:
-                    made.append((name, other, words))
-    return tuple(made)
+                    yield name, other, words

@@ -9,15 +9,7 @@ from scipy.stats import chi2 as chi2_distribution
 
 from rhythmid.compare.compare import Comparison, run_of
 from rhythmid.diagnose.answer.compose import estimated
-from rhythmid.diagnose.answer.described import (
-    given_values,
-    hints_of,
-    labels_of,
-    listed,
-    qualities,
-    slots_of,
-    words_of,
-)
+from rhythmid.diagnose.answer.described import described, labels_of
 from rhythmid.diagnose.answer.present_effort import effort_findings
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.delays import delays_of
@@ -101,7 +93,6 @@ def findings(
     pumpings = {id(record): active_pumping(record) for record in (*records, *holdout)}
     chosen = result.selection.chosen
     labels = labels_of(chosen.kind)
-    elements = _elements(found, nominal)
     seen = {record.name: pumpings[id(record)] for record in records}
     added = bool(found.best.added)
     runs = free_runs(found.nominal, found.fit, seen, added, labels)
@@ -116,14 +107,10 @@ def findings(
     count = max(len(found.rounds[0].scores), 1)
     repeats = noise_from_repeats(found.fit.run.series)
     return Findings(
-        result=diagnosis.to_dict(),
-        source=f"{name} against {listed([r.name for r in records])}",
-        slots=slots_of(nominal),
+        **described(diagnosis, chosen, nominal, records, holdout, _elements(found, nominal), command, name),
         forced=any(one.forcing is not None for one in result.calibration.series),
         compared=Compared("motion", nominal.units.position),
         runs=tuple(runs),
-        chosen=chosen.names,
-        output_unit=nominal.units.position,
         force_unit=nominal.units.force,
         noise=repeats.variance**0.5 if repeats else None,
         slow_noise=(repeats or noise_of(found.fit.residuals, found.fit.run.series)).long_run_variance ** 0.5,
@@ -133,16 +120,11 @@ def findings(
         transfer=_transfer(
             found, [p for r in records if (p := pumpings[id(r)])], result.calibration.series, nominal
         ),
-        nominal=given_values(nominal),
         refitted={name: asdict(estimated(found.nominal, name)) for name in found.nominal.model.parameters},
         refitted_delays=delays_of(found.nominal),
-        records=qualities(records, holdout),
-        words=words_of(elements),
-        command=command,
         models=models,
         at_bound=found.fit.at_bound,
         unconverged=tuple(trial.names for trial in found.trials if not trial.converged),
-        hints=hints_of(diagnosis.indistinguishable, elements),
         correlation=_correlation(found.fit),
     )
 

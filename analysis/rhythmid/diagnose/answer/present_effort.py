@@ -7,15 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.answer.compose_effort import effort_delays, effort_parameters
-from rhythmid.diagnose.answer.described import (
-    given_values,
-    hints_of,
-    labels_of,
-    listed,
-    qualities,
-    slots_of,
-    words_of,
-)
+from rhythmid.diagnose.answer.described import described, labels_of
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.found_delay import with_found_delay
@@ -44,7 +36,8 @@ def effort_findings(
     """The content of the report as plain data: recorded effort beside the models' predictions; arguments as for `present`."""
     before, after = result.nominal, result.chosen
     changed = bool(after.elements)
-    labels = labels_of(result.selection.chosen.kind)
+    chosen = result.selection.chosen
+    labels = labels_of(chosen.kind)
     size = size_of(result.search.balance)
     final = after if changed else None
     runs = effort_runs(result.search.balance, before, final, size, labels)
@@ -57,25 +50,16 @@ def effort_findings(
     elements += [term.element for one in result.search.hypotheses for term in one.fit.model.terms]
     unit = _unit(records, nominal)
     return Findings(
-        result=diagnosis.to_dict(),
-        source=f"{name} against {listed([record.name for record in records])}",
-        slots=slots_of(nominal),
+        **described(diagnosis, chosen, nominal, records, holdout, elements, command, name),
         forced=any(record.forcing is not None for record in records),
         compared=Compared("effort", unit, "predicted", result.applicability.bandwidth),
         runs=tuple(runs),
-        chosen=result.selection.chosen.names,
-        output_unit=nominal.units.position,
         force_unit=unit,
-        nominal=given_values(nominal),
         refitted={key: asdict(value) for key, value in effort_parameters(before).items()},
-        records=qualities(records, holdout),
-        words=words_of(elements),
-        command=command,
         models=models,
         refitted_delays=effort_delays(result.search.balance, before),
         functions=_functions(result, nominal, unit) if changed else (),
         at_bound=tuple(n for n, at in zip(after.fit.names, after.fit.at_limit[1:], strict=True) if at),
-        hints=hints_of(diagnosis.indistinguishable, elements),
     )
 
 

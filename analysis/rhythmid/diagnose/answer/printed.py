@@ -19,39 +19,44 @@ NOMINAL = "nominal model"
 
 def show(found: Diagnosis, console: Console) -> None:
     """Print a diagnosis."""
-    lines = _Lines(console)
-    verdict = found.verdict.replace("_", " ")
-    lines.told(verdict, found.summary)
-    lines.said("where", found.location.where)
+
+    def told(label: str, text: str) -> None:
+        console.print(f"[bold]{escape(label)}[/]: {escape(text)}")
+
+    def said(label: str, text: str) -> None:
+        console.print(f"{escape(label)}: {escape(text)}")
+
+    told(found.verdict.replace("_", " "), found.summary)
+    said("where", found.location.where)
     for effect in found.missing:
         sizes = f"{written_percent(effect.share)} of the mismatch"
         if found.verdict == "missing_physics":  # with other verdicts the answer does not state the name
             sizes = f"probability {_probability(effect.probability)}, {sizes}"
-        lines.told(effect.element, f"{effect.equation}   ({sizes})")
-        told = {
+        told(effect.element, f"{effect.equation}   ({sizes})")
+        sizes_of = {
             name: asdict(one) if one.std is not None else asdict(one) | {"value": None}
             for name, one in effect.parameters.items()
         }
-        print_estimates(console, "", told, "parameter")
+        print_estimates(console, "", sizes_of, "parameter")
     for family in found.families if found.verdict == "undecided" else ():
         sizes = (
             f"probability {_probability(family.probability)}, {written_percent(family.share)} of the mismatch"
         )
-        lines.said(f"some form of {family.family}", f"{sizes}: {', '.join(family.laws)}")
+        said(f"some form of {family.family}", f"{sizes}: {', '.join(family.laws)}")
     if len(found.missing) > 1 and found.verdict == "missing_physics":
-        lines.said("joint probability of these names", _probability(found.joint_probability))
+        said("joint probability of these names", _probability(found.joint_probability))
     for group in found.indistinguishable:
-        lines.said("indistinguishable here", ", ".join(group))
+        said("indistinguishable here", ", ".join(group))
     if len(found.hypotheses) > 1:
         _print_hypotheses(found, console)
-    lines.said("remainder", remainder_words(found))
-    lines.said("scored", scoring_words(found.scoring))
+    said("remainder", remainder_words(found))
+    said("scored", scoring_words(found.scoring))
     for name, fit in found.fit.items():
         if name == "augmented" and fit == found.refitted_nominal:
             continue  # the same model as the refitted nominal one
         held = NONE if fit.heldout_nrmse is None else f"{fit.heldout_nrmse:.5f}"
         of = averaged_words(found.scoring.averaged)
-        lines.said(name.replace("_", " "), f"NRMSE{of} {fit.train_nrmse:.5f} on fitted data, {held} held out")
+        said(name.replace("_", " "), f"NRMSE{of} {fit.train_nrmse:.5f} on fitted data, {held} held out")
     for label, group in (
         ("assumption", found.assumptions),
         ("calibration", found.calibration),
@@ -59,23 +64,10 @@ def show(found: Diagnosis, console: Console) -> None:
         ("note", found.notes),
     ):
         for line in group:
-            lines.said(label, line)
+            said(label, line)
     for line in rejection_words(told_rejections(found)):
-        lines.said("rejected", line)
-    lines.said("next experiment", found.next_experiment)
-
-
-class _Lines:
-    """Console lines that begin with a label; text is printed without interpreting markup."""
-
-    def __init__(self, console: Console) -> None:
-        self._console = console
-
-    def told(self, label: str, text: str) -> None:
-        self._console.print(f"[bold]{escape(label)}[/]: {escape(text)}")
-
-    def said(self, label: str, text: str) -> None:
-        self._console.print(f"{escape(label)}: {escape(text)}")
+        said("rejected", line)
+    said("next experiment", found.next_experiment)
 
 
 def _print_hypotheses(found: Diagnosis, console: Console) -> None:

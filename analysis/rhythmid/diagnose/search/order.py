@@ -10,12 +10,12 @@ from dataclasses import replace
 from rhythmid.deadline import time_is_up
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.trial import Origin, Proposal, Trial
-from rhythmid.elements.element import Element
+from rhythmid.elements.element import Element, Slot
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series
-from rhythmid.model import Model, Term
+from rhythmid.model import Model
 
-CHAINS = ("command", "actuator", "sensor")
+CHAINS: tuple[Slot, ...] = ("command", "actuator", "sensor")
 
 
 def in_best_order(trial: Trial, series: Sequence[Series], noise: NoiseModel, step: float) -> Trial:
@@ -30,10 +30,11 @@ def in_best_order(trial: Trial, series: Sequence[Series], noise: NoiseModel, ste
 def other_orders(model: Model, label: str) -> Iterator[Model]:
     """The model with the term called `label` at each other place of its chain; none if it is alone or in no chain."""
     moving = model.term(label)
-    if moving is None or not _passes_on(moving, moving.element.slot):
+    if moving is None or not passes_on(moving.element):
         return
+    slot = moving.element.slot
     rest = [term for term in model.terms if term is not moving]
-    chain = [term for term in rest if _passes_on(term, moving.element.slot)]
+    chain = [term for term in rest if term.element.slot == slot and passes_on(term.element)]
     now = sum(model.terms.index(term) < model.terms.index(moving) for term in chain)
     for place in range(len(chain) + 1):
         if place == now:
@@ -42,12 +43,6 @@ def other_orders(model: Model, label: str) -> Iterator[Model]:
         yield replace(model, terms=(*rest[:at], moving, *rest[at:]))
 
 
-def _passes_on(term: Term, slot: str) -> bool:
-    """Whether a term is a link of the slot's chain. Delays are not, because they commute; controllers are not, either."""
-    element = term.element
-    return (
-        slot in CHAINS
-        and element.slot == slot
-        and element.kernel is not None
-        and element.acts == Element.acts
-    )
+def passes_on(element: Element) -> bool:
+    """Whether an element is a link of its slot's chain. Delays are not, because they commute; controllers are not, either."""
+    return element.slot in CHAINS and element.kernel is not None and element.acts == Element.acts
