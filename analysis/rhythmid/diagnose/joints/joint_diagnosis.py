@@ -205,27 +205,37 @@ def _explained(
 
     A correction takes about so many seconds.
     """
+    found: dict[str, JointResult] = {}
+    refused = dict(unsigned)
     links: dict[str, WrongLink] = {}
     balances = with_common_stamps(balances)
 
-    def searched(
-        joints: Sequence[str], end: float = EXPLAINED
-    ) -> tuple[ReferenceDelay | None, dict[str, JointResult], dict[str, str]]:
-        """The delay of the references and the results of joints, of the machine and the balances as they are now."""
+    def search(joints: Sequence[str], end: float = EXPLAINED) -> ReferenceDelay | None:
+        """Search joints of the machine and the balances as they are now; the delay of their references.
+
+        The joints share the time until this share of the budget has passed: each has the same part of what those before it have left, in which it is
+        also weighed.
+        """
         unseen = JointBalances.of(machine, holdout, balances) if holdout else None
         delay = reference_delay(balances, balances.computed) if balances.computed else None
-        return delay, *_searched(balances, unseen, joints, catalogue, tell, budget, delay, end)
+        late = 0.0 if delay is None else delay.shared.value
+        for place, joint in enumerate(joints):
+            tell(f"joint {joint}")
+            own = budget.part(end, len(joints) - place)
+            try:
+                found[joint] = diagnose_joint(balances, unseen, joint, catalogue, tell, own, late)
+            except InputError as error:
+                refused[joint] = str(error)
+        return delay
 
-    joints = [joint for joint in machine.joints if joint not in unsigned]
-    delay, found, refused = searched(joints, SEARCHED)
-    refused, given = {**unsigned, **refused}, found
+    delay = search([joint for joint in machine.joints if joint not in unsigned], SEARCHED)
+    given = dict(found)
     most = max(MOST_LINKS, len(machine.body.links))
     tilt: BaseTilt | None = None
     gears: dict[str, GearCompliance] = {}
     uncorrected = machine
-    weighed: Machine | None = (
-        None  # the machine whose shared causes have been compared with the laws of its joints
-    )
+    # the machine whose shared causes have been compared with the laws of its joints
+    weighed: Machine | None = None
     while max(len(links), len(balances.refuted_links)) < most and budget.allows(correction, WEIGHED):
         told = _values_of_links(found, set(links))
         again = list(found)
@@ -257,17 +267,14 @@ def _explained(
             break
         if shared is not None:
             tell(shared.words)
-        delay, better, refused_now = searched(again)
-        found, refused = {**found, **better}, {**refused, **refused_now}
+        delay = search(again)
     if len(links) > 1 and budget.allows(correction, WEIGHED):
         tell("fitting the changes of all links together")
         if together := exchanged(JointBalances.of(uncorrected, records, balances), records, found, links):
             changed = {split(parameter)[0] for parameter in links}
             links, machine = together, next(iter(together.values())).corrected
             balances = JointBalances.of(machine, records, balances)
-            again = [joint for joint in found if any(feels(balances, joint, link) for link in changed)]
-            delay, better, refused_now = searched(again)
-            found, refused = {**found, **better}, {**refused, **refused_now}
+            delay = search([j for j in found if any(feels(balances, j, link) for link in changed)])
     return _Explained(machine, found, refused, links, balances.leads, delay, tilt, gears, given)
 
 
@@ -300,25 +307,6 @@ def _values_of_links(found: Mapping[str, JointResult], known: set[str]) -> dict[
     for _, link, joint in sorted(made):
         told.setdefault(link, []).append(joint)
     return told
-
-
-def _searched(
-    balances: JointBalances, unseen: JointBalances | None, joints: Sequence[str], catalogue: Catalogue,
-    tell: Tell, budget: Budget, delay: ReferenceDelay | None, end: float,
-) -> tuple[dict[str, JointResult], dict[str, str]]:  # fmt: skip
-    """The results of joints, and the reasons for those that cannot be judged. They share the time until this share of the budget has passed:
-    each has the same part of what those before it have left, in which it is also weighed."""
-    found: dict[str, JointResult] = {}
-    refused: dict[str, str] = {}
-    late = 0.0 if delay is None else delay.shared.value
-    for place, joint in enumerate(joints):
-        tell(f"joint {joint}")
-        own = budget.part(end, len(joints) - place)
-        try:
-            found[joint] = diagnose_joint(balances, unseen, joint, catalogue, tell, own, late)
-        except InputError as error:
-            refused[joint] = str(error)
-    return found, refused
 
 
 def stated_at(one: JointResult) -> tuple[str, ...]:
