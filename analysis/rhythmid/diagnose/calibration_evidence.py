@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-import numpy as np
-
 from rhythmid.diagnose.constants import PRACTICAL, REST
 from rhythmid.diagnose.contenders import Rows, linearised, rows_of
 from rhythmid.diagnose.evidence import Linearised, predict, weight_for
@@ -22,7 +20,6 @@ from rhythmid.diagnose.search.forward import search
 from rhythmid.diagnose.search.score_tests import under
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
-from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series
@@ -42,10 +39,8 @@ class Seen:
     @classmethod
     def of(cls, fit: Fit, pool: ThreadPoolExecutor | None) -> "Seen":
         """Assume white noise: the missing part is not noise, and whitening it would remove most of a constant."""
-        left = np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series, strict=True)])
-        noise = NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
-        fit = under(fit, noise, pool)
-        rows = rows_of(fit.run.series, (), noise)
+        fit = under(fit, fit.white, pool)
+        rows = rows_of(fit.run.series, (), fit.noise)
         reach = reach_of(fit, rows, pool)
         return cls(fit, rows, reach, following(linearised(fit, rows), rows, reach))
 

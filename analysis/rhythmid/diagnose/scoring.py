@@ -59,9 +59,7 @@ class Scoring:
     @property
     def error(self) -> float:
         """Rms of the calibrated model's residuals, in the output's unit."""
-        fit = self.calibration.fit
-        left = [residual[one.used] for residual, one in zip(fit.residuals, fit.run.series)]
-        return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
+        return self.calibration.fit.white.std
 
 
 def settle(

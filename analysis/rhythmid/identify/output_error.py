@@ -75,6 +75,12 @@ class Fit:
         """Sum of the squared residuals, not whitened."""
         return sum(float(r @ r) for r in self.residuals)
 
+    @property
+    def white(self) -> NoiseModel:
+        """White noise of the size of the residuals."""
+        left = np.concatenate([r[one.used] for r, one in zip(self.residuals, self.run.series, strict=True)])
+        return NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
+
     def nrmse(self, hidden: bool = False) -> float:
         """rms(simulated − measured) / std(measured) over the averages used, or over the hidden ones."""
         return normalised_error(self.residuals, self.run.series, hidden)

@@ -1,7 +1,6 @@
 """Zeros that differ from record to record, detected by a fit to several records: each becomes a nuisance parameter
 of the fit."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,6 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.identify.joint import JointFit
 from rhythmid.identify.least_squares import column_norms
-from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate, minimise
 from rhythmid.identify.record_zero import others_marked, with_record_zero
 from rhythmid.identify.robust_covariance import widening
@@ -33,9 +31,7 @@ def zero_scores(fit: Fit) -> Array:
     White noise is assumed, because the effect of a missing element is not noise. The standard deviations are
     confirmed by the scores of blocks.
     """
-    left = np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series, strict=True)])
-    white = NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
-    fit = minimise(fit.model, fit.run, fit.names, white, fit.starts, 10, differences=fit.differences)
+    fit = minimise(fit.model, fit.run, fit.names, fit.white, fit.starts, 10, differences=fit.differences)
     here, series = fit.linearisation, fit.run.series
     problem = Problem(fit.run, fit.names, fit.noise, None)
     names = tuple(dict.fromkeys(record_of(one) for one in series))[1:]

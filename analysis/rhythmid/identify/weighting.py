@@ -8,12 +8,9 @@ are. The two fits agree for a correct model and may differ for a wrong one: J. A
 1251.
 """
 
-import math
-
 import numpy as np
 
 from rhythmid.errors import InputError
-from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.robust_covariance import with_robust_covariance
 
@@ -32,17 +29,11 @@ def efficient_fit(fit: Fit) -> Fit:
     ordinary = fit
     try:
         for _ in range(2):  # first to the minimum, then with the noise level of the residual there
-            ordinary = minimise(ordinary.model, fit.run, fit.names, _white(ordinary), ordinary.starts)
+            ordinary = minimise(ordinary.model, fit.run, fit.names, ordinary.white, ordinary.starts)
     except InputError:
         return weighted
     ordinary = with_robust_covariance(ordinary)
     return ordinary if ordinary.converged and _scatter(ordinary, weighted) < 0.0 else weighted
-
-
-def _white(fit: Fit) -> NoiseModel:
-    """White noise of the size of the fit's residual."""
-    left = np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series, strict=True)])
-    return NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
 
 
 def _scatter(one: Fit, other: Fit) -> float:
