@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from machines import hopper
+from rhythmid.diagnose.joints.joint_case import joint_catalogue
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
 from rhythmid.simulation.plant import Plant
@@ -14,6 +15,7 @@ from rhythmid.simulation.signal import spline, zero_order_hold
 from rhythmid.simulation.simulate import simulate
 
 CATALOGUE = load_catalogue()
+AT_JOINTS = joint_catalogue(CATALOGUE)
 NOMINAL = ("gravity", "linear_spring", "switched_damper", "input_delay", "measurement_delay")
 # controllers and motors: they change what u is
 CONTROLLERS = [
@@ -78,6 +80,8 @@ def test_says_what_it_is_in_all_its_fields(name):
     )
     assert set(element.confusable) <= set(CATALOGUE), "confusable with an element that does not exist"
     assert set(element.special_case_of) <= set(CATALOGUE)
+    richer = AT_JOINTS[name].special_case_of  # the more richer laws a law has, the more basic it counts
+    assert len(set(richer)) == len(richer)
     assert name not in element.confusable and all(element.confusable.values())
     if element.candidate:
         assert element.starts is not None, "a candidate needs first guesses"
@@ -92,9 +96,12 @@ def test_says_what_it_is_in_all_its_fields(name):
         assert owner in ("inertia", "simulation") or CATALOGUE[owner].parameter(parameter)
 
 
-@pytest.mark.parametrize("name", [name for name in CATALOGUE if CATALOGUE[name].starts])
-def test_first_guesses_are_complete_and_within_bounds(name, scales):
-    element = CATALOGUE[name]
+@pytest.mark.parametrize(
+    "element",
+    [one for one in CATALOGUE.values() if one.starts] + [one for one in AT_JOINTS.values() if one.at_joint],
+    ids=lambda one: one.name,
+)
+def test_first_guesses_are_complete_and_within_bounds(element, scales):
     assert element.starts is not None
     for known in (
         scales,
