@@ -85,7 +85,7 @@ class JointBalances:
         The forces at each joint are those of `alike`, too, unless payloads or centres of mass are at other places, or gravity differs.
         """
         stretches = joint_stretches(machine, records)
-        cut, dominant = (alike.cut, alike.dominant) if alike else _cut(machine, stretches)
+        cut, dominant = (alike.cut, alike.dominant) if alike else cut_of(machine, stretches)
         bodies = [_body_motion(machine, one, cut) for one in stretches]
         names = [f"{link}.{MASS}" for link in machine.body.links]
         names += [f"{link}.{PAYLOAD}" for link in machine.body.ends]
@@ -254,7 +254,7 @@ def joint_model(
     return replace(path, mass=mass, terms=(*terms, Term(element, BODY, values)))
 
 
-def _cut(machine: Machine, stretches: Sequence[JointStretch]) -> tuple[float, float]:
+def cut_of(machine: Machine, stretches: Sequence[JointStretch]) -> tuple[float, float]:
     """Highest frequency [Hz] of the fastest joint's motion, and the strongest frequency [Hz] of all joints."""
     found = []
     for joint in machine.joints:
@@ -269,12 +269,17 @@ def _cut(machine: Machine, stretches: Sequence[JointStretch]) -> tuple[float, fl
     return max(cut for cut, _ in found), float(np.median([line for _, line in found]))
 
 
-def _body_motion(machine: Machine, stretch: JointStretch, cut: float) -> BodyMotion:
+def sampled(stretch: JointStretch, cut: float) -> tuple[int, Array, Array, Array, Array]:
+    """The number of samples of a stretch of which one is kept, and there its time (n,), pose, rate and acceleration (n, nv) below the cut."""
     every = max(1, int(1.0 / (FINER * cut * stretch.period)))
     time = stretch.time[::every]
     pose = low_pass(stretch.pose, stretch.period, cut)[::every]
     rate = CubicSpline(time, pose).derivative()(time)
-    acceleration = CubicSpline(time, rate).derivative()(time)
+    return every, time, pose, rate, CubicSpline(time, rate).derivative()(time)
+
+
+def _body_motion(machine: Machine, stretch: JointStretch, cut: float) -> BodyMotion:
+    every, time, pose, rate, acceleration = sampled(stretch, cut)
     force = machine.body.inverse(pose, rate, acceleration)
     return BodyMotion(stretch, time, pose, rate, acceleration, force, stretch.period * every, every)
 

@@ -14,14 +14,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from scipy.optimize import nnls
 
 from rhythmid.body.inertial_parameter import ARMATURE
 from rhythmid.body.machine import Machine
-from rhythmid.identify.inverse_dynamics.bandwidth import bandwidth_of_motion
-from rhythmid.identify.inverse_dynamics.motion import FINER, Stretch, low_pass
-from rhythmid.identify.joints.joint_motion import CLEAR
+from rhythmid.identify.inverse_dynamics.motion import low_pass
+from rhythmid.identify.joints.joint_motion import CLEAR, cut_of, sampled
 from rhythmid.identify.joints.joint_stretch import TOUCHING_DISTANCE, JointStretch, joint_stretches
 from rhythmid.identify.least_squares import column_norms
 from rhythmid.model import Model
@@ -103,7 +101,7 @@ class RecordedMotion:
         # contact is checked for each reading: with degrees taken for radians the feet are anywhere
         stretches = joint_stretches(replace(machine, body=replace(body, contacts=False)), [part])
         self.computed = tuple(joint for joint in self.joints if joint in stretches[0].reference)
-        cut = _cut(machine, stretches)
+        cut, _ = cut_of(machine, stretches)
         found = [_sampled(machine, one, cut) for one in stretches]
         every = max(1, sum(len(one.pose) for one in found) // POSES)
         self._pose, self._rate, self._acceleration, self._effort = (
@@ -272,19 +270,6 @@ def _without_sign(columns: Array, wanted: Array) -> tuple[Array, float]:
     return values / norms, float(missed) / math.sqrt(len(wanted))
 
 
-def _cut(machine: Machine, stretches: list[JointStretch]) -> float:
-    """Highest frequency [Hz] of the fastest joint's motion."""
-    found = []
-    for joint in machine.joints:
-        place = machine.body.joints[joint].position
-        raw = [
-            Stretch(s.record, s.name, s.time, s.pose[:, place], s.time, s.period, "force", "position")
-            for s in stretches
-        ]
-        found.append(bandwidth_of_motion(raw)[0])
-    return max(found)
-
-
 @dataclass(frozen=True, eq=False)
 class _Sampled:
     """Poses, rates, accelerations (n, nv) and efforts (n, joints) of a stretch below the cut-off, at intervals
@@ -298,11 +283,7 @@ class _Sampled:
 
 
 def _sampled(machine: Machine, stretch: JointStretch, cut: float) -> _Sampled:
-    every = max(1, int(1.0 / (FINER * cut * stretch.period)))
-    time = stretch.time[::every]
-    pose = low_pass(stretch.pose, stretch.period, cut)[::every]
-    rate = CubicSpline(time, pose).derivative()(time)
-    acceleration = CubicSpline(time, rate).derivative()(time)
+    every, _, pose, rate, acceleration = sampled(stretch, cut)
     effort = np.column_stack(
         [_effort(machine.paths[joint], joint, stretch, place) for joint, place in _places(machine)]
     )
