@@ -27,7 +27,7 @@ from rhythmid.diagnose.joints.link_cause import LIGHTEST, feels, likely_link
 from rhythmid.diagnose.joints.link_exchange import exchanged
 from rhythmid.diagnose.joints.misfit import braking, late_efforts, misfits
 from rhythmid.diagnose.joints.stated import augmented, stated_parameters
-from rhythmid.diagnose.joints.wrong_link import WrongLink
+from rhythmid.diagnose.joints.wrong_link import MATTERS, WrongLink
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.joints.common_stamps import with_common_stamps
@@ -52,7 +52,6 @@ if TYPE_CHECKING:
 MOST_LINKS = 2
 # time of the correction of a link's value, in times that the balances of all joints take (measured: 20 for an arm of seven joints)
 CORRECTION = 20.0
-MATTERS = 0.02  # smallest change of a mass or an inertia that an effort balance resolves, as a share of it
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from rhythmid.report.quantity import with_std
 
 Array = NDArray[np.float64]
 AXES = ("x", "y", "z")
-LIGHT = 0.02  # share of a link's mass from which what is added to it is told as a body of its own: less is not resolved
+MATTERS = 0.02  # smallest change of a mass or an inertia that an effort balance resolves, as a share of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,18 +67,15 @@ class WrongLink:
     def _added(self, own: Principal) -> list[str]:
         """What the link carries beyond its own inertia in the nominal model, in words, if a body can have that."""
         more = self.corrected.body.own(split(self.parameter)[0]).ten - own.ten
-        if more[0] <= LIGHT * own.mass or not Principal.from_ten(more).possible:
+        if more[0] <= MATTERS * own.mass or not Principal.from_ten(more).possible:
             return []
         places = ", ".join(f"{one:.3g}" for one in more[1:4] / more[0])
         return [f"that is a body of {more[0]:.3g} kg at ({places}) m on the link"]
 
     def beside(self, machine: Machine) -> str:
         """One sentence with the machine's value and the corrected one."""
-        (link, kind), own, told = (
-            split(self.parameter),
-            machine.body.own(split(self.parameter)[0]),
-            self.told(machine.body),
-        )
+        link, kind = split(self.parameter)
+        own, told = machine.body.own(link), self.told(machine.body)
         if kind in (CENTRE, LOAD):
             distance = float(np.linalg.norm(own.centre - origin_of(machine.body, link)))
             before = {MASS: own.mass, MOMENT: own.mass * distance}
