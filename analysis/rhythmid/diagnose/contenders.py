@@ -108,6 +108,7 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
                 held_power, held_total = held_power + one.power(mask), held_total + count
     record = np.concatenate([np.full(count, number, dtype=np.int64) for number, count in lengths])
     held = np.arange(len(names), 2 * len(names) + len(other_names))
+    rounding = max(one.resolution for one in (*series, *unseen))
     return Rows(
         seen,
         hidden,
@@ -115,15 +116,10 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
         noise,
         record,
         np.concatenate(spread),
-        Blocks.of(record, noise.order, held, _rounding((*series, *unseen), noise)),
+        Blocks.of(record, noise.order, held, rounding / math.sqrt(12.0) / noise.std),
         float(np.sqrt(power / max(total, 1))),
         float(np.sqrt(held_power / max(held_total, 1))),
     )
-
-
-def _rounding(series: Sequence[Series], noise: NoiseModel) -> float:
-    """Standard deviation of the rounding error, in units of the innovations of the noise."""
-    return max(one.resolution for one in series) / math.sqrt(12.0) / noise.std
 
 
 def linearised(fit: Fit, rows: Rows) -> Linearised:

@@ -31,7 +31,8 @@ def delays_of(fit: Fit) -> dict[str, Any]:
                 places[key] = fit.names.index(name)
         else:
             found[key] = {}
-    if found["input"] and found["measurement"]:
+    both = bool(found["input"] and found["measurement"])
+    if both:
         chosen = list(places.values())
         with np.errstate(invalid="ignore"):  # infinity minus infinity: undetermined
             variance = float(fit.covariance[np.ix_(chosen, chosen)].sum())
@@ -40,20 +41,14 @@ def delays_of(fit: Fit) -> dict[str, Any]:
         found["sum"] = {"value": total, "std": scatter, "unit": "s"}
     else:
         found["sum"] = dict(found["input"] or found["measurement"])
-    separable = True
-    if len(places) == 2:
-        each = [found[key]["std"] for key in places]
-        limit = max(20.0 * (found["sum"]["std"] or 0.0), 2e-3)
-        separable = all(std is not None and std < limit for std in each)
-    elif len(places) < 2 and not (found["input"] and found["measurement"]):
-        separable = False
-    found["separable"] = separable
-    forced = any(one.forcing is not None for one in fit.run.series)
-    if not forced:
+    limit = max(20.0 * (found["sum"].get("std") or 0.0), 2e-3)
+    known = [found[key]["std"] is not None and found[key]["std"] < limit for key in places]
+    found["separable"] = both and (len(known) < 2 or all(known))
+    if all(one.forcing is None for one in fit.run.series):
         found["assumption"] = (
             "no forcing is recorded: only the sum of the delays shows, and it is written to the one delay that is free"
         )
-    elif found["input"] and found["measurement"]:
+    elif both:
         found["assumption"] = (
             "the recorded forcing acts on the machine at its stamps, without the command's delay"
         )

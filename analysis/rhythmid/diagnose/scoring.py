@@ -181,9 +181,6 @@ def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
     shortest = LEAST_BLOCKS * max(one.period * one.block for one in series)
     length = max(float(np.median([periods_long(one) for one in series])), shortest)
     while length >= shortest:
-        yield _Way("windows", _words(length, LOSES if free else INTEGRATES), partial(cut_up, length=length))
+        said = f"windows of {length:.2g} s with initial states of their own (multiple shooting): "
+        yield _Way("windows", said + (LOSES if free else INTEGRATES), partial(cut_up, length=length))
         length /= 2.0
-
-
-def _words(length: float, reason: str) -> str:
-    return f"windows of {length:.2g} s with initial states of their own (multiple shooting): {reason}"

@@ -82,7 +82,12 @@ def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
     whole = contest.mismatch
     rivals = [(quantity, (), one, len(contest.maps)) for quantity, one in contest.maps.items()]
     rivals += [
-        ("", _further(one, chosen), one.prediction, contest.candidates)
+        (
+            "",
+            tuple(name for name in one.names if name not in chosen.names),
+            one.prediction,
+            contest.candidates,
+        )
         for one in contest.hypotheses
         if len(one.elements) > len(chosen.elements) and one.kind == "effects"
     ]
@@ -115,11 +120,6 @@ def significance(prediction: Prediction, candidates: int) -> float:
     """
     blocks = len(prediction.log_density)
     return float(student.isf(FALSE_ALARM / max(candidates, 1), max(blocks - 1, 1)))
-
-
-def _further(other: Hypothesis, chosen: Hypothesis) -> tuple[str, ...]:
-    """Names of the effects of another hypothesis that are not in the chosen one."""
-    return tuple(name for name in other.names if name not in chosen.names)
 
 
 def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:

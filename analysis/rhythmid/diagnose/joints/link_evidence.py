@@ -84,7 +84,10 @@ def gain_of(
     that needs another effect at a joint beside it explains less than one that needs none.
     """
     sides = [_moved(one, fitted, *side) for side in (before, after) for fitted in hypotheses]
-    net = _net_scores(one, sides)
+    net = np.zeros(len(sides))
+    if (predictions := _predictions(one, sides)) is not None:
+        prices = [_price(one) * len(fitted.elements) for fitted in sides]
+        net = np.array([each.score for each in predictions]) - np.array(prices)
     first = len(hypotheses)
     best = first + int(net[first:].argmax())
     return float(net[best] - net[:first].max()), sides[best]
@@ -98,15 +101,6 @@ def advantage(one: JointResult, first: Fitted, second: Fitted) -> tuple[float, f
         return 0.0, 0.0
     gain, error = difference(*predictions)
     return gain - _price(one) * (len(first.elements) - len(second.elements)), error
-
-
-def _net_scores(one: JointResult, fits: Sequence[Fitted]) -> Array:
-    """Log scores (h,) less the price of the effects; zeros where not all have the same rows."""
-    predictions = _predictions(one, fits)
-    if predictions is None:
-        return np.zeros(len(fits))
-    prices = [_price(one) * len(fitted.elements) for fitted in fits]
-    return np.array([each.score for each in predictions]) - np.array(prices)
 
 
 def _predictions(one: JointResult, fits: Sequence[Fitted]) -> list[Prediction] | None:
