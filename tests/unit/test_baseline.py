@@ -9,6 +9,7 @@ import pytest
 from rhythmid.diagnose import baseline
 from rhythmid.diagnose.baseline import NO_ORIGIN, calibrate, with_delays
 from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.identify import other_starts
 from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
@@ -80,12 +81,18 @@ def test_a_delay_far_from_its_start_is_taken_where_it_lowers_the_error_by_far(mo
 
     def fitted(model: Model, error: float) -> Any:
         return SimpleNamespace(
-            model=model, names=[INPUT_DELAY], chi2=error, run=None, noise=None, starts=(), nrmse=lambda: error
+            model=model,
+            names=[INPUT_DELAY],
+            chi2=error,
+            run=SimpleNamespace(series=[driven(0.05)]),
+            noise=None,
+            starts=(),
+            nrmse=lambda: error,
         )
 
-    monkeypatch.setattr(baseline, "minimise", lambda model, *_: fitted(model, ratio))
-    monkeypatch.setattr(baseline, "estimate", lambda model, *_, **__: fitted(model, ratio))
-    found = baseline._scan_delays(fitted(model, 1.0), [driven(0.05)], None)
+    monkeypatch.setattr(other_starts, "minimise", lambda model, *_: fitted(model, ratio))
+    monkeypatch.setattr(other_starts, "estimate", lambda model, *_, **__: fitted(model, ratio))
+    found = baseline._from_far_delays(fitted(model, 1.0), None)
     assert (found.model.value(INPUT_DELAY) > 0.0) is moved
 
 

@@ -16,16 +16,17 @@ from rhythmid.diagnose.constants import CONTRADICTS, FOLLOWS, LATEST, NOT_HELD_L
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.early_output import EARLIEST
-from rhythmid.identify.multiple_shooting import split
-from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
+from rhythmid.identify.harmonic_likelihood import DELAYS
+from rhythmid.identify.other_starts import from_delays, from_windows
+from rhythmid.identify.output_error import Fit, estimate, with_bounds
 from rhythmid.identify.record_scales import REST_LENGTH
-from rhythmid.identify.series import Series, dominant_frequency
+from rhythmid.identify.series import Series
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.timing import nominal_period
 from rhythmid.report.quantity import with_written_unit
 from rhythmid.simulation.signal import OVERSAMPLING, band_limited, first_order_hold, is_held
-from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
+from rhythmid.simulation.transport import INPUT_DELAY
 from rhythmid.value import Prior
 
 NO_ORIGIN = "No position was measured, so that its origin is arbitrary: the spring's rest length is kept as it was given."
@@ -71,14 +72,6 @@ def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) ->
     return model.with_parameters({INPUT_DELAY: nuisance})
 
 
-def _shooting_start(model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Model:
-    """Start values from short windows with initial states of their own, in which wrong values cannot drift far."""
-    length = 2.0 / max(dominant_frequency(one) for one in series)
-    windows = [part for one in series for part in split(one, length)]
-    chosen = windows[:: max(1, len(windows) // 60)]
-    return estimate(model, chosen, iterations=12, pool=pool).model
-
-
 def check_free(model: Model) -> None:
     """Raise InputError for a model that has no free parameter."""
     if not model.free:
@@ -110,7 +103,7 @@ def calibrate(
         failure = error
     if best is None or ((best.nrmse() > SETTLED or not best.converged) and not time_is_up()):
         try:
-            again = estimate(_shooting_start(model, series, pool), series, pool=pool)
+            again = estimate(from_windows(model, series, pool), series, pool=pool)
             if best is None or again.sum_of_squares < best.sum_of_squares:
                 best = again
         except InputError as error:
@@ -122,7 +115,7 @@ def calibrate(
         found = calibrate(_as_given(model, INERTIA), series, catalogue, pool, tell)
         return replace(found, notes=(*notes, _no_mass(model), *found.notes))
     if best.nrmse() > FOLLOWS and not time_is_up():
-        best = _scan_delays(best, series, pool)
+        best = _from_far_delays(best, pool)
     found = _hold(best, series, pool, tell)
     return replace(found, notes=(*notes, *found.notes))
 
@@ -140,24 +133,11 @@ def _no_mass(model: Model) -> str:
     )
 
 
-def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Fit:
-    """Try delays far from the start: a delay beyond half a period of the motion is another local minimum."""
-    names = [name for name in (INPUT_DELAY, MEASUREMENT_DELAY) if name in fit.names]
-    best = fit
-    for name in names:
-        for delay in FAR_DELAYS:
-            if delay > fit.model.parameters[name].bounds[1]:
-                continue
-            model = fit.model.with_values({name: delay})
-            try:
-                trial = minimise(model, fit.run, fit.names, fit.noise, fit.starts, 12, pool)
-            except InputError:
-                continue
-            if trial.chi2 < best.chi2:
-                best = trial
-    if best is fit:
-        return fit
-    found = estimate(best.model, series, pool=pool)
+def _from_far_delays(fit: Fit, pool: ThreadPoolExecutor | None) -> Fit:
+    """The fit, or that from a delay far from its own if it leaves much less."""
+    bounds = {name: fit.model.parameters[name].bounds for name in DELAYS if name in fit.names}
+    tried = {name: [delay for delay in FAR_DELAYS if delay <= high] for name, (_, high) in bounds.items()}
+    found = from_delays(fit, tried, pool)
     return found if found.nrmse() < STANDS_IN * fit.nrmse() else fit
 
 

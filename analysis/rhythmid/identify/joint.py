@@ -25,8 +25,8 @@ from rhythmid.identify.harmonic_likelihood import (
     harmonic_likelihood,
 )
 from rhythmid.identify.initial_step import value_before
-from rhythmid.identify.multiple_shooting import split
-from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
+from rhythmid.identify.other_starts import from_delays, from_windows
+from rhythmid.identify.output_error import Fit, estimate, with_bounds
 from rhythmid.identify.search_quality import NOISE_ALONE, Search, cycle_columns, explained
 from rhythmid.identify.series import Series, dominant_frequency, prepare
 from rhythmid.ltp.pumping import Pumping, active_pumping, pumping_of
@@ -169,14 +169,9 @@ def _starts(
 def _search_in_time(model: Model, series: Sequence[Series]) -> Fit:
     """Fit without a start from the harmonics: first short windows with initial states of their own, then delays far
     apart."""
-    length = 2.0 / max(dominant_frequency(one) for one in series)
-    windows = [part for one in series for part in split(one, length)]
     best: Fit | None = None
     failure: InputError | None = None
-    for attempt in (
-        lambda: model,
-        lambda: estimate(model, windows[:: max(1, len(windows) // 60)], iterations=12).model,
-    ):
+    for attempt in (lambda: model, lambda: from_windows(model, series)):
         try:
             trial = estimate(attempt(), series)
         except InputError as error:
@@ -189,19 +184,8 @@ def _search_in_time(model: Model, series: Sequence[Series]) -> Fit:
     if best is None:
         assert failure is not None
         raise failure
-    reached = best
-    for name in (n for n in DELAYS if n in best.names):
-        for delay in np.linspace(0.0, LONGEST_DELAY, 9)[1:]:
-            try:
-                trial = minimise(
-                    reached.model.with_values({name: delay}), reached.run, reached.names, reached.noise,
-                    reached.starts, 12,
-                )  # fmt: skip
-            except InputError:
-                continue
-            if trial.chi2 < best.chi2:
-                best = trial
-    return best if best is reached else estimate(best.model, series)
+    apart = np.linspace(0.0, LONGEST_DELAY, 9)[1:]
+    return from_delays(best, {name: apart for name in DELAYS if name in best.names})
 
 
 def joint_likelihood(records: Record | Sequence[Record], model: Model) -> JointFit:
