@@ -131,9 +131,7 @@ class Design(Result):
     @property
     def covariance(self) -> JointCovariance:
         """Predicted covariance of all free parameters, delays included."""
-        fit = self.prediction.fit
-        values = fit.model.parameters
-        return JointCovariance.of(fit.names, [values[name].unit for name in fit.names], fit.covariance)
+        return self.prediction.fit.joint_covariance
 
     def tables(self) -> Mapping[str, Sequence[Row]]:
         """`estimates`: each parameter and delay with its predicted standard deviation."""

@@ -108,9 +108,7 @@ class Answer(Result):
         """
         if not isinstance(self.result, FreeRunResult):
             raise InputError("parameters that were fitted to the recorded effort have no joint covariance")
-        fit = self.result.search.fit
-        values = fit.model.parameters
-        return JointCovariance.of(fit.names, [values[name].unit for name in fit.names], fit.covariance)
+        return self.result.search.fit.joint_covariance
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `diagnose --json`."""

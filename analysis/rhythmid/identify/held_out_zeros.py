@@ -70,8 +70,7 @@ def _error(
         zeros = [value for value, _ in zeros_of(fit).values()]
     except InputError:
         return None
-    left = np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series, strict=True)])
-    return math.sqrt(float(np.mean(left**2))), zeros[0] if zeros else 0.0
+    return fit.white.std, zeros[0] if zeros else 0.0
 
 
 def _sentence(name: str, zero: float, unit: str) -> str:

@@ -262,9 +262,7 @@ class Identification(Result):
         """
         if self.joint is None:
             raise InputError("the paper's method has no joint covariance; identify with method='joint'")
-        fit = self.joint.fit
-        values = fit.model.parameters
-        return JointCovariance.of(fit.names, [values[name].unit for name in fit.names], fit.covariance)
+        return self.joint.fit.joint_covariance
 
     def tables(self) -> Mapping[str, Sequence[Row]]:
         """`estimates`; `harmonics`: the transfer functions, frequency by frequency; `held_out`: the error of each held-out record."""

@@ -14,6 +14,7 @@ from rhythmid.identify.covariance import covariance_of, on_the_edge
 from rhythmid.identify.descent import WHITE, Descent, descend, first_guess
 from rhythmid.identify.free_run import FreeRun, halved, integrable, prepare_run, sufficient
 from rhythmid.identify.ill_conditioned import ill_conditioned, with_ill_conditioned_directions
+from rhythmid.identify.joint_covariance import JointCovariance
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.sensitivity import Linearisation, Problem
 from rhythmid.identify.series import Series
@@ -80,6 +81,12 @@ class Fit:
         """White noise of the size of the residuals."""
         left = np.concatenate([r[one.used] for r, one in zip(self.residuals, self.run.series, strict=True)])
         return NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
+
+    @property
+    def joint_covariance(self) -> JointCovariance:
+        """Covariance of the parameters, with their units."""
+        units = [self.model.parameters[name].unit for name in self.names]
+        return JointCovariance.of(self.names, units, self.covariance)
 
     def nrmse(self, hidden: bool = False) -> float:
         """rms(simulated − measured) / std(measured) over the averages used, or over the hidden ones."""

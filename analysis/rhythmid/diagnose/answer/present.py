@@ -21,7 +21,6 @@ from rhythmid.diagnose.search.round import LEVEL
 from rhythmid.elements.element import Element
 from rhythmid.errors import InputError
 from rhythmid.identify.admissible import admissible
-from rhythmid.identify.joint_covariance import JointCovariance
 from rhythmid.identify.motion_band import bandwidth
 from rhythmid.identify.output_error import Fit, noise_of
 from rhythmid.identify.repeats import noise_from_repeats
@@ -131,10 +130,7 @@ def findings(
 
 def _correlation(fit: Fit) -> Correlation | None:
     """Correlation of the fitted parameters; None for a single one."""
-    if len(fit.names) < 2:
-        return None
-    units = [fit.model.parameters[name].unit for name in fit.names]
-    return Correlation(fit.names, JointCovariance.of(fit.names, units, fit.covariance).correlation)
+    return Correlation(fit.names, fit.joint_covariance.correlation) if len(fit.names) > 1 else None
 
 
 def _scores(found: Search) -> tuple[ElementScore, ...]:

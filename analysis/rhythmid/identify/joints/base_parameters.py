@@ -19,6 +19,7 @@ from scipy.linalg import qr
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, linearise
 from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.identify.least_squares import orthonormal
 
 Array = NDArray[np.float64]
 NAMES = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
@@ -99,9 +100,7 @@ def _paths(fit: EffortFit) -> tuple[str, ...]:
 
 def _without(values: Array, nuisance: Array) -> Array:
     """Residual of values (n, p) after a least-squares fit of the nuisance columns."""
-    norms = np.linalg.norm(nuisance, axis=0)
-    left, singular, _ = np.linalg.svd(nuisance[:, norms > 0.0] / norms[norms > 0.0], full_matrices=False)
-    basis = left[:, singular > 1e-9 * singular[0]]
+    basis = orthonormal(nuisance)
     return values - basis @ (basis.T @ values)
 
 

@@ -13,6 +13,7 @@ from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.motion import FEWEST_STRETCH_SAMPLES
 from rhythmid.identify.inverse_dynamics.reference_path import Commanded
 from rhythmid.identify.joints.reference_lead import HeldReference, held_reference
+from rhythmid.identify.noise import runs
 from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Record, Uniform
@@ -76,11 +77,9 @@ def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[Jo
             for joint, one in driven.items()
             if one[1] is not None
         }
-        ends = np.flatnonzero(np.diff(np.concatenate([[0], (valid & flying).astype(int), [0]])))
-        for first, end in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
-            if end - first < FEWEST_STRETCH_SAMPLES:
+        for part in runs(valid & flying):
+            if part.stop - part.start < FEWEST_STRETCH_SAMPLES:
                 continue
-            part = slice(first, end)
             found.append(
                 JointStretch(
                     number, record.name, grid[part], pose[part],
