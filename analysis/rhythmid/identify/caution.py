@@ -3,7 +3,9 @@
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-Name = Literal["not_identified", "other_unit", "large_shift", "value_at_zero", "long_delay", "negative_delay"]
+Name = Literal[
+    "not_identified", "other_unit", "large_shift", "value_at_zero", "long_delay", "negative_delay", "half_interval"
+]  # fmt: skip
 
 GIVEN_VALUES = "Are the values that the model is given near the machine's? If so, `rhythmid diagnose` names the physics that it lacks."
 

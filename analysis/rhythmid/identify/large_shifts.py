@@ -19,6 +19,8 @@ TIMES = 4.0  # ratio of an estimate to the nominal value above which the shift i
 SAMPLES = 10.0
 PASSED_BY = 2.0  # standard deviations by which an estimate has to exceed a limit
 EARLY_LEAST = 0.05  # share of a sample by which a delay has to be negative to be reported
+# share of half an interval by which a delay may differ from it: the hold also attenuates, which other parameters take up
+SAME_HALF = 0.01
 # standard deviations of the closure within which limit cycle and response agree about the delays
 AGREES = 5.0
 ABSORBING = "the fit may be absorbing missing physics"
@@ -37,6 +39,7 @@ def large_shifts(
         *_values(nominal, parameters),
         *_negative_delays(nominal, delays, period),
         *_long_delays(nominal, delays, period, length),
+        *_half_intervals(nominal, delays, records),
     )
 
 
@@ -119,6 +122,25 @@ def _long_delays(nominal: Model, delays: Delays, period: float, length: float) -
             "play and friction.",
             f"delay: {side}", found.value, expected, "s",
         )  # fmt: skip
+
+
+def _half_intervals(nominal: Model, delays: Delays, records: Sequence[Record]) -> Iterator[Caution]:
+    """A delay of half an interval of an input that is not taken as held: a command that is held causes it on average."""
+    if any(one.input is None or one.hold == "zero" for one in records):
+        return
+    half = 0.5 * max(one.input.period for one in records if one.input is not None)
+    for side, found, expected in _estimated(nominal, delays):
+        if side == "measurement" or found.value is None or found.std is None:
+            continue
+        off, spread = found.value - expected - half, max(found.std, SAME_HALF * half)
+        if SURE * spread < half and abs(off) < PASSED_BY * spread:
+            yield Caution(
+                "half_interval",
+                f"{_named(side)} at {_size(found)}, half of the time between two samples of the input: a command that each sample "
+                "holds until the next one acts so late where it is read as measured",
+                "Was the input commanded, not measured? Then give it hold: zero in signals.yaml, and the delay is as much shorter.",
+                f"delay: {side}", found.value, expected, "s",
+            )  # fmt: skip
 
 
 def _size(found: Estimate) -> str:

@@ -1,8 +1,10 @@
-"""Hold of a command between samples: an event-based command holds its value; a measured signal changes between samples.
+"""Hold of a command between samples: a command holds its value until the next one; a measured signal changes between samples.
 
-Where samples do not resolve the signal, neither straight lines nor a band-limited curve give its values between
-them. The samples show whether they resolve it: then a line through a sample's neighbours is closer to it than the
-sample before.
+Two kinds of commands show their hold. One comes as an event: where samples do not resolve the signal, neither straight
+lines nor a band-limited curve give its values between them. The samples show whether they resolve it: then a line
+through a sample's neighbours is closer to it than the sample before. The other is logged more often than it is
+updated: after a step it stands still, exactly, until the next update. A measured signal that is rounded also stands
+still, but then its steps are those of its rounding.
 """
 
 from dataclasses import replace
@@ -11,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.record.record import Channel, Record
+from rhythmid.record.rounding import shown_resolution
 
 Array = NDArray[np.float64]
 # ratio of the input's interval to the output's above which the input is far sparser. Loggers sample measured
@@ -21,6 +24,10 @@ SPARSE = 10.0
 # which a line misses 13 %. Unrelated steps give 0.71, independent samples 0.87
 RESOLVED = 0.5
 LEAST_SAMPLES_TO_RESOLVE = 3  # samples, of which one has two neighbours
+# share of the changes that are steps after which the signal stands still, above which it is held between updates: these are at
+# least 1.5 samples apart. A signal within limits stands still after few changes; one with spikes on a constant level after half
+STANDS_STILL = 0.5
+ROUNDING = 1.5  # rounding steps: a change of one may be that of a rounded signal
 
 
 def held_note(given: Channel, answer: Channel) -> str | None:
@@ -30,6 +37,11 @@ def held_note(given: Channel, answer: Channel) -> str | None:
     value = given.value[first]
     if len(time) < 2 or len(of_answer) < 2 or np.ptp(value) == 0.0:
         return None
+    if interval := update_interval(given, answer):
+        return (
+            f"its value stands still from one step to the next, usually for {interval:.3g} s: each is taken as held until the next one "
+            "(hold: zero); where it was measured, say  hold: linear"
+        )
     usual = float(np.median(np.diff(time)))
     if usual < SPARSE * float(np.median(np.diff(of_answer))) or _is_resolved(time, value):
         return None
@@ -37,6 +49,23 @@ def held_note(given: Channel, answer: Channel) -> str | None:
         f"its {len(given)} samples, usually {usual:.3g} s apart, change in steps and are far sparser than the output's: each is taken as "
         "held until the next one (hold: zero); where it was measured, say  hold: linear"
     )
+
+
+def update_interval(given: Channel, answer: Channel) -> float:
+    """Usual time [s] from one step of a driving channel to the next, where it stands still between them; 0 where it does not.
+
+    Samples at which the response also has its previous value are copies of a message, and do not count.
+    """
+    time, value = given.time, given.value
+    moved = np.concatenate([[True], np.diff(answer.value) != 0.0])
+    if np.array_equal(time, answer.time):
+        time, value = time[moved], value[moved]
+    change = np.abs(np.diff(value))
+    at = np.flatnonzero(change[:-1])
+    step = change[at] > ROUNDING * shown_resolution(value)
+    if len(at) == 0 or np.mean(step & (change[at + 1] == 0.0)) <= STANDS_STILL:
+        return 0.0
+    return float(np.median(np.diff(time[at + 1]))) if len(at) > 1 else float(np.ptp(time))
 
 
 def with_hold(record: Record) -> Record:

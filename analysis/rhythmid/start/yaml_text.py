@@ -241,12 +241,15 @@ def _held_note(one: Recorded, roles: Roles) -> str | None:
 
 def _held_comment(one: Recorded, roles: Roles) -> list[str]:
     """A comment where the samples or messages of the driving signal show a hold that no name states."""
-    note = None if meaning_of(one).commanded or roles.input_kind == "reference" else _held_note(one, roles)
-    if note is None and _is_like_a_command(one, roles):
+    if meaning_of(one).commanded or roles.input_kind == "reference":
+        return []
+    if _is_like_a_command(one, roles):
         note = (
             "its messages have no stamps, as those of commands, so each is taken as held until the next one (hold: zero); "
             "where it was measured, say  hold: linear"
         )
+    else:
+        note = _held_note(one, roles)
     return comment(f"  CHECK: {note}.") if note else []
 
 
