@@ -31,7 +31,9 @@ from rhythmid.value import Prior
 
 NO_ORIGIN = "No position was measured, so that its origin is arbitrary: the spring's rest length is kept as it was given."
 EVEN = 1e-3  # of the period; spread of the sampling intervals up to which the samples count as even
-SETTLED = 0.1  # error, as a share of the motion, up to which a fit is not restarted from short windows
+# error, as a share of the motion, up to which a fit is not restarted from short windows. At another minimum the model parts from
+# the motion somewhere, by a part of it; of a pendulum that turns over, a tenth of the whole is a turn
+SETTLED = 0.01
 # [s] delays from which another minimum is sought: from a few samples to a slow network
 FAR_DELAYS = (0.03, 0.08, 0.15, 0.25)
 
@@ -103,7 +105,7 @@ def calibrate(
         failure = error
     if best is None or ((best.nrmse() > SETTLED or not best.converged) and not time_is_up()):
         try:
-            again = estimate(from_windows(model, series, pool), series, pool=pool)
+            again = from_windows(model, series, pool)
             if best is None or again.sum_of_squares < best.sum_of_squares:
                 best = again
         except InputError as error:

@@ -171,9 +171,9 @@ def _search_in_time(model: Model, series: Sequence[Series]) -> Fit:
     apart."""
     best: Fit | None = None
     failure: InputError | None = None
-    for attempt in (lambda: model, lambda: from_windows(model, series)):
+    for attempt in (estimate, from_windows):
         try:
-            trial = estimate(attempt(), series)
+            trial = attempt(model, series)
         except InputError as error:
             failure = error
             continue

@@ -6,19 +6,31 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from rhythmid.errors import InputError
-from rhythmid.identify.multiple_shooting import split
+from rhythmid.identify.multiple_shooting import periods_long, split
 from rhythmid.identify.output_error import Fit, estimate, minimise
-from rhythmid.identify.series import Series, dominant_frequency
+from rhythmid.identify.series import Series
 from rhythmid.model import Model
 
-WINDOWS = 60  # short windows that are fitted, spread over all records
+WINDOWS = 60  # short windows that are fitted, beside the first of each series
+ITERATIONS = 12  # of a fit that only gives a start
 
 
-def from_windows(model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None = None) -> Model:
-    """Start values from short windows with initial states of their own, in which wrong values cannot drift far."""
-    length = 2.0 / max(dominant_frequency(one) for one in series)
-    windows = [part for one in series for part in split(one, length)]
-    return estimate(model, windows[:: max(1, len(windows) // WINDOWS)], iterations=12, pool=pool).model
+def from_windows(model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None = None) -> Fit:
+    """The fit from the values and initial states of short windows with initial states of their own, in which wrong values cannot drift far.
+
+    Values alone are not enough where a machine parts from a motion that begins a little elsewhere, as a pendulum does near its
+    upper rest: a run with the right values and a rough initial state ends in another turn.
+    Raises InputError where the model diverges.
+    """
+    length = float(np.median([periods_long(one) for one in series]))
+    windows, firsts = list[Series](), list[int]()
+    for one in series:
+        firsts.append(len(windows))
+        windows += split(one, length)
+    chosen = sorted({*firsts, *range(0, len(windows), max(1, len(windows) // WINDOWS))})
+    short = estimate(model, [windows[index] for index in chosen], iterations=ITERATIONS, pool=pool)
+    starts = [short.starts[chosen.index(first)] for first in firsts]
+    return estimate(short.model, series, starts=starts, pool=pool)
 
 
 def from_delays(
@@ -30,7 +42,7 @@ def from_delays(
         for delay in tried:
             model = fit.model.with_values({name: delay})
             try:
-                trial = minimise(model, fit.run, fit.names, fit.noise, fit.starts, 12, pool)
+                trial = minimise(model, fit.run, fit.names, fit.noise, fit.starts, ITERATIONS, pool)
             except InputError:
                 continue
             if trial.chi2 < best.chi2:

@@ -1,0 +1,38 @@
+"""A fit that starts from short windows finds the motion of a machine that parts from it at the slightest difference."""
+
+import numpy as np
+import pytest
+from untidy_logs import FAULTS, MACHINES, simulated, written
+
+from rhythmid.diagnose.baseline import calibrate
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.identify.identify import identify
+from rhythmid.identify.multiple_shooting import periods_long, windows
+from rhythmid.identify.series import hold_out_tail, prepare
+from rhythmid.model import Model
+from rhythmid.record.read import read_record
+
+MACHINE = MACHINES["pendulum"]  # driven over the top
+NOISE = 1e-3  # share of the motion
+
+
+def files(folder, kind, seed):
+    table = FAULTS[kind](np.random.default_rng(1000 + seed), simulated(MACHINE, 0.0, seed, kind))
+    return written(folder / "run", MACHINE, table)
+
+
+@pytest.mark.parametrize("kind", ["few_lost", "lost_apart"])
+@pytest.mark.parametrize("long", [True, False])
+def test_a_pendulum_that_turns_over_is_followed_with_lost_samples_too(tmp_path, kind, long):
+    signals, model = files(tmp_path, kind, 501)
+    series = prepare([read_record(signals)])
+    cut, _ = hold_out_tail(series if long else windows(series, periods_long(series[0])))
+    found = calibrate(Model.load(model), cut, load_catalogue()).fit
+    assert found.nrmse() < NOISE
+    assert found.model.value("pendulum_gravity.moment") == pytest.approx(1.0, abs=1e-4)
+
+
+def test_identify_follows_a_pendulum_that_turns_over(tmp_path):
+    signals, model = files(tmp_path, "few_lost", 501)
+    found = identify([read_record(signals)], Model.load(model))
+    assert found.usable and found.parameters["pendulum_gravity.moment"].value == pytest.approx(1.0, abs=1e-4)
