@@ -5,7 +5,7 @@ import pytest
 
 from rhythmid.record.channel_quality import channel_quality
 from rhythmid.record.clock_skew import clock_skew
-from rhythmid.record.clocks import clock_notes
+from rhythmid.record.clocks import assumed_columns, clock_notes
 from rhythmid.record.quality import ChannelQuality
 
 STAMPS = np.arange(30_000) * 1e-3
@@ -51,3 +51,9 @@ def test_clocks_that_run_apart_are_told_with_the_uncertainty(clock):
 def test_two_channels_of_one_clock_that_differs_from_the_recorders_do_not_run_apart():
     both = {"input": channel(5e-5, 1), "output": channel(5e-5, 2)}
     assert clock_notes(both, {"input": "header", "output": "header"}) == ()
+
+
+def test_times_in_different_columns_of_a_table_are_assumed_to_share_one_clock():
+    (note,) = assumed_columns({"input": "t", "output": "t2", "velocity": "t2"})
+    assert note.startswith("assumed: input (times in t) and output, velocity (times in t2) share one clock")
+    assert assumed_columns({"input": "t", "output": "t"}) == ()

@@ -85,8 +85,8 @@ def printed(answer: Diagnosis = ANSWER) -> str:
         "assumption: The recorded effort is taken to be true in scale.",
         "not tried: sensor_lag, sensor_drift: not seen",
         "rejected: second mode (only a limit of its parameters is identifiable, where it is another effect)",
-        "refitted nominal: NRMSE 0.05000 on fitted data, 0.06000 held out",
-        "augmented: NRMSE 0.01000 on fitted data, — held out",
+        "refitted nominal: NRMSE 0.05 on fitted data, 0.06 held out",
+        "augmented: NRMSE 0.01 on fitted data, — held out",
         "next experiment: a slow reversal [of the speed]",
     ],
 )

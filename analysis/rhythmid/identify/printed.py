@@ -6,7 +6,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from rhythmid.report.quantity import averaged_words, rounded
+from rhythmid.report.quantity import averaged_words, number, rounded
 from rhythmid.report.terminal_table import print_estimates
 
 
@@ -41,7 +41,7 @@ def show(result: Mapping[str, Any], console: Console) -> None:
     quality = result["quality"]
     of = averaged_words(quality.get("averaged", 1))
     console.print(
-        f"{quality['rate']:.6g} Hz, {quality['gaps']} gaps of the output, free-run NRMSE {quality['nrmse']:.5f}{of}"
+        f"{quality['rate']:.6g} Hz, {quality['gaps']} gaps of the output, free-run NRMSE {number(quality['nrmse'], 3)}{of}"
     )
     _show_held_out(result.get("held_out"), console)
     for note in result["notes"]:
@@ -54,9 +54,11 @@ def _show_held_out(held_out: Mapping[str, Any] | None, console: Console) -> None
         return
     records = held_out["records"]
     if held_out["nrmse"] is not None:
-        console.print(f"held out: free-run NRMSE {held_out['nrmse']:.5f}")
+        console.print(f"held out: free-run NRMSE {number(held_out['nrmse'], 3)}")
     for one in records if len(records) > 1 or held_out["nrmse"] is None else ():
-        told = f"no free run: {one['missing']}" if one["nrmse"] is None else f"NRMSE {one['nrmse']:.5f}"
+        told = (
+            f"no free run: {one['missing']}" if one["nrmse"] is None else f"NRMSE {number(one['nrmse'], 3)}"
+        )
         console.print(f"held out, {one['record']}: {told}", markup=False)
 
 

@@ -56,6 +56,18 @@ def assumed_clock(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, s
     )
 
 
+def assumed_columns(columns: Mapping[str, str]) -> tuple[str, ...]:
+    """Assumption where channels of tables have times in different columns; `columns` says for each by role in which."""
+    names = list(dict.fromkeys(columns.values()))
+    if len(names) < 2:
+        return ()
+    told = " and ".join(
+        f"{', '.join(role for role, own in columns.items() if own == name)} (times in {name})"
+        for name in names
+    )
+    return (f"assumed: {told} share one clock; an offset between the clocks counts as delay",)
+
+
 def _running_apart(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
     """Notes on channels whose clock drifts relative to that of the output, according to receive times."""
     rates = {role: _rate(channel, clocks.get(role)) for role, channel in channels.items()}

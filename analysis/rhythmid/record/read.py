@@ -14,7 +14,7 @@ from rhythmid.progress import Tell, counted, silent
 from rhythmid.record.arrival_bursts import without_bursts
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.channel_quality import channel_quality
-from rhythmid.record.clocks import assumed_clock, clock_notes
+from rhythmid.record.clocks import assumed_clock, assumed_columns, clock_notes
 from rhythmid.record.columns import Columns, without_times
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.held_command import with_held_commands, with_hold
@@ -259,7 +259,9 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
     """Channels in order of time without duplicates, and their quality as recorded."""
     channels: dict[str, Any] = {}
     judgement: dict[str, ChannelQuality] = {}
-    clocks = {role: samples.source.clock(signals.time).kind for role, samples in made.items()}
+    given = {role: samples.source.clock(signals.time) for role, samples in made.items()}
+    clocks = {role: clock.kind for role, clock in given.items()}
+    columns = {role: str(clock.column) for role, clock in given.items() if clock.kind == "column"}
     stamped = clocks["output"] != "rate"
     for role, samples in made.items():
         label = f"{samples.source.place}{samples.source}"
@@ -291,10 +293,11 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         shared = next((c.time for c in channels.values() if np.array_equal(c.time, time)), time)
         channels[role] = Channel(shared, value, samples.source.unit, str(samples.source))
     channels, burst_notes = without_bursts(channels)
-    notes = (*quality.notes, *clock_notes(judgement, clocks), *burst_notes)
+    assumed = (*assumed_clock(judgement, clocks), *assumed_columns(columns))
+    notes = (*quality.notes, *clock_notes(judgement, clocks), *assumed_columns(columns), *burst_notes)
     return Record(
         name, input_kind=signals.input_kind, output_kind=signals.output_kind, forcing_law=signals.forcing_law,
-        quality=replace(quality, channels=judgement, notes=notes, assumed=assumed_clock(judgement, clocks)),
+        quality=replace(quality, channels=judgement, notes=notes, assumed=assumed),
         parameters=signals.declared(name), stamped=stamped,
         **channels,
     )  # fmt: skip

@@ -9,7 +9,15 @@ from rich.markup import escape
 from rhythmid.diagnose.answer.result import Diagnosis, Explanation, Scored
 from rhythmid.diagnose.rejections import Rejection
 from rhythmid.report.hypotheses import grouped, interchangeable, most_weighed
-from rhythmid.report.quantity import NONE, RARE, averaged_words, remaining_error, with_std, written_percent
+from rhythmid.report.quantity import (
+    NONE,
+    RARE,
+    averaged_words,
+    number,
+    remaining_error,
+    with_std,
+    written_percent,
+)
 from rhythmid.report.terminal_table import print_estimates, print_table
 
 HYPOTHESES_SHOWN = 6
@@ -54,9 +62,11 @@ def show(found: Diagnosis, console: Console) -> None:
     for name, fit in found.fit.items():
         if name == "augmented" and fit == found.refitted_nominal:
             continue  # the same model as the refitted nominal one
-        held = NONE if fit.heldout_nrmse is None else f"{fit.heldout_nrmse:.5f}"
+        held = number(fit.heldout_nrmse, 3)
         of = averaged_words(found.scoring.averaged)
-        said(name.replace("_", " "), f"NRMSE{of} {fit.train_nrmse:.5f} on fitted data, {held} held out")
+        said(
+            name.replace("_", " "), f"NRMSE{of} {number(fit.train_nrmse, 3)} on fitted data, {held} held out"
+        )
     for label, group in (
         ("assumption", found.assumptions),
         ("calibration", found.calibration),
