@@ -134,3 +134,17 @@ def test_a_table_of_nothing_but_times_is_the_clock_of_the_tables_with_as_many_ro
     roles = {role: choice.recorded.column for role, choice in begun.guess.roles.choices.items()}
     assert roles == {"output": "data_position.0", "input": "data_torque.0"}
     assert [note.split(" ")[0] for note in begun.guess.inventory.notes] == ["data_filtered.csv"]
+
+
+def test_stamps_in_ns_of_messages_in_bursts_are_those_of_the_even_ones_beside_them(tmp_path):
+    """Of five messages that are sent within 0.3 ms, most steps are of 0.08 ms, which would be µs by their size."""
+    began, folder = 1669909568 * 10**9, tmp_path / "run"
+    folder.mkdir()
+    bursts = (np.arange(0, 8 * 10**9, 10**8)[:, None] + np.arange(5) * 80_000).ravel()
+    even = np.arange(0, 8 * 10**9, 10**8)
+    for name, column, after in (("wrench", "force", bursts), ("state", "position", even)):
+        rows = "\n".join(f"{began + one},{np.sin(one * 1e-9):.6f}" for one in after)
+        (folder / f"{name}.csv").write_text(f"%time,{column}\n{rows}\n")
+    found = inventory(folder)
+    assert {one.column for one in found.recorded} == {"wrench.force", "state.position"}
+    assert np.ptp(np.concatenate([one.time for one in found.recorded])) == pytest.approx(7.9, abs=0.01)

@@ -33,6 +33,16 @@ def test_a_constant_set_point_drives_a_machine_that_starts_away_from_it(tmp_path
     assert any(line.startswith("CHECK input: it never changes: taken for a step") for line in found.lines())
 
 
+@pytest.mark.parametrize("asked", ["TargetCounts", "setpoint", "goal"])
+def test_a_constant_that_was_asked_for_needs_no_quantity_where_the_output_goes_to_it(tmp_path, asked):
+    found = guess(log(tmp_path, EncoderPosition=95.0 * RISE + NOISE, **{asked: np.full(len(TIME), 100.0)}))
+    assert {role: str(one.recorded) for role, one in found.roles.choices.items()} == {
+        "output": "EncoderPosition",
+        "input": asked,
+    }
+    assert (found.roles.input_kind, found.roles.reference_of) == ("reference", "position")
+
+
 def test_the_gain_of_a_step_is_told_by_how_fast_the_speed_rises(tmp_path):
     path = log(tmp_path, speed_ref=np.full(len(TIME), 10.0), speed=10.0 * RISE + 0.01 * NOISE)
     assert start([path]).nominal.model.value("velocity_control.gain") == pytest.approx(1.0 / 0.3, rel=0.3)

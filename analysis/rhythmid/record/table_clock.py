@@ -211,8 +211,7 @@ def named_clock(name: str, value: Array) -> tuple[Clock, str]:
     elif not _is_dated(value, scale):
         for other, unit in UNITS:
             if _is_dated(value, other):
-                when = datetime.fromtimestamp(float(value[0]) * other, UTC).date()
-                why = f"its heading says {heading.written}, but as {unit} it is a date ({when}), so that {unit} is taken"
+                why = f"its heading says {heading.written}, but as {unit} it is a date ({_date(value, other)}), so that {unit} is taken"
                 scale = other
     return Clock("column", column=name, scale=scale), f"called a time, and goes forward; {why}"
 
@@ -223,9 +222,18 @@ def _is_dated(value: Array, scale: float) -> bool:
     return DATED[0] <= float(value[0]) * scale <= DATED[1] and 0.0 < step < LONGEST_STEP
 
 
+def _date(value: Array, scale: float) -> str:
+    """The day of the first time."""
+    return str(datetime.fromtimestamp(float(value[0]) * scale, UTC).date())
+
+
 def _guessed_scale(value: Array) -> tuple[float, str]:
-    """Seconds per unit of a time without a stated unit, from the size of its steps."""
+    """Seconds per unit of a time without a stated unit: that in which it is a date, else by the size of its steps. Messages
+    that come in bursts are closer together than a unit tells."""
     step = float(np.median(np.diff(value)))
+    for scale, unit in UNITS:
+        if _is_dated(value, scale):
+            return scale, f"as {unit} it is a date ({_date(value, scale)})"
     if SERIAL_DAYS[0] <= value[0] <= SERIAL_DAYS[1] and step <= 1.2 / DAY:
         return (
             DAY,

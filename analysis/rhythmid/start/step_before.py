@@ -40,8 +40,11 @@ def set_point_before(
 ) -> Recorded | None:
     """The one set point of the output, among the constants, to which the output moves from another value; None
     where there is none or several."""
-    asked = [one for one in _asked(constant, joint, measured) if _missed(output, one) < LEFT]
-    return asked[0] if len(asked) == 1 else None
+    for candidates in (_asked(constant, joint, measured), _asked_of_what(constant)):
+        asked = [one for one in candidates if _missed(output, one) < LEFT]
+        if asked:
+            return asked[0] if len(asked) == 1 else None
+    return None
 
 
 def gone_to_set_point(
@@ -62,6 +65,14 @@ def _asked(constant: Sequence[Recorded], joint: Joint, measured: Quantity) -> li
         one for one in constant
         if (meaning := meaning_of(one)).quantity == measured and meaning.commanded and meaning.certain
         and joint.includes(one, meaning) and np.isfinite(one.value).all()
+    ]  # fmt: skip
+
+
+def _asked_of_what(constant: Sequence[Recorded]) -> list[Recorded]:
+    """The constants that were asked for, of which no name says what they are: `target`, `TargetCounts`."""
+    return [
+        one for one in constant
+        if (meaning := meaning_of(one)).quantity is None and meaning.commanded and np.isfinite(one.value).all()
     ]  # fmt: skip
 
 
