@@ -3,6 +3,7 @@ otherwise one by one."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from rhythmid.record.block import Block, Topic
 from rhythmid.record.field import Field
 from rhythmid.record.layout import Layout, Unsupported, value_of
 from rhythmid.record.message_types import stamp_path, type_fields, typestore
+from rhythmid.record.orientation import angle_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +70,11 @@ class _Reader:
                 raise InputError(f"topic {self.topic.name}: {error}") from None
         stamp = stamp_path(self.topic)
         self.has_stamp = stamp is not None
-        self.paths = [*self.fields, *(Field.parse(f"{stamp}.{part}") for part in ("sec", "nanosec") if stamp)]
+        self.parts = [one.components(self.topic.type, types) for one in self.fields]
+        self.paths = [
+            *chain.from_iterable(self.parts),
+            *(Field.parse(f"{stamp}.{part}") for part in ("sec", "nanosec") if stamp),
+        ]
 
     def add(self, block: Block) -> None:
         if block.topic.type != self.topic.type:
@@ -133,16 +139,27 @@ class _Reader:
         log_ns = np.concatenate([np.empty(0, dtype=np.int64), *self.log_ns])
         sent = [part for part in self.sent_ns if part is not None]
         sent_ns = np.concatenate(sent) if sent and len(sent) == len(self.sent_ns) else None
+        ends = np.cumsum([len(parts) for parts in self.parts])
+        places = [slice(end - len(parts), end) for parts, end in zip(self.parts, ends, strict=True)]
         return Columns(
             self.topic,
             log_ns,
             sent_ns if sent_ns is not None and _says_when_sent(sent_ns, log_ns) else None,
             stamp_ns,
-            dict(zip(self.fields, rows, strict=False)),
-            dict(zip(self.fields, missing, strict=False)),
-            self.reason,
+            {one: _value(one, rows[place]) for one, place in zip(self.fields, places, strict=True)},
+            {one: np.logical_or.reduce(missing[place]) for one, place in zip(self.fields, places, strict=True)},
+            {
+                one: self.reason[parts[0]]
+                for one, parts in zip(self.fields, self.parts, strict=True)
+                if parts[0] in self.reason
+            },
             self.singly,
         )
+
+
+def _value(field: Field, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A field's values (n,) from those of its components (1, n) or (4, n)."""
+    return rows[0] if len(rows) == 1 else angle_of(str(field.steps[-1]), rows)
 
 
 def _says_when_sent(sent_ns: NDArray[np.int64], log_ns: NDArray[np.int64]) -> bool:

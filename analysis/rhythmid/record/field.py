@@ -9,6 +9,7 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 
 from rhythmid.errors import InputError
+from rhythmid.record.orientation import ANGLES, PARTS, is_orientation
 
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[\s*([^\[\]]+?)\s*\]")
 LONGEST_POSITION = 10  # digits of an index into a list; the length of a list is a 32-bit number
@@ -57,11 +58,13 @@ class Field:
         kind: Any = (Nodetype.NAME, msgtype)
         named = False  # whether a message on the path names its entries
         done = ""
-        for step in self.steps:
+        for number, step in enumerate(self.steps, start=1):
             if isinstance(step, str):
                 if kind[0] != Nodetype.NAME:
                     raise InputError(f"field {self.text!r}: {done or msgtype} has no parts{_hint(kind)}")
                 fields = dict(types[kind[1]][1])
+                if number == len(self.steps) and step in ANGLES and is_orientation(fields):
+                    return
                 if step not in fields:
                     near = get_close_matches(step, fields, 1)
                     mend = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(fields)}"
@@ -82,6 +85,18 @@ class Field:
             done += f"[{step if isinstance(step, int) else step[0]}]"
         if kind[0] != Nodetype.BASE or kind[1][0] in ("string", "wstring"):
             raise InputError(f"field {self.text!r}: {done} is not one number{_hint(kind)}")
+
+    def components(self, msgtype: str, types: TypeFields) -> tuple["Field", ...]:
+        """The numbers from which it is computed: x, y, z and w of a quaternion for an angle of it, else itself. Its path must be one of
+        `msgtype`."""
+        kind: Any = (Nodetype.NAME, msgtype)
+        for step in self.steps[:-1]:
+            kind = dict(types[kind[1]][1])[step] if isinstance(step, str) else kind[1][0]
+        of_angle = self.steps[-1] in ANGLES and kind[0] == Nodetype.NAME
+        if not of_angle or not is_orientation(dict(types[kind[1]][1])):
+            return (self,)
+        before = self.text.rpartition(".")[0]
+        return tuple(Field(f"{before}.{part}", (*self.steps[:-1], part)) for part in PARTS)
 
 
 def _name_themselves(kind: Any, types: TypeFields) -> bool:

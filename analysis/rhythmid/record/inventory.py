@@ -23,7 +23,8 @@ from rhythmid.record.grouped_runs import grouped_runs
 from rhythmid.record.heading import heading_of
 from rhythmid.record.joined_stamps import stamp_pairs
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
-from rhythmid.record.message_types import typestore
+from rhythmid.record.message_types import type_fields, typestore
+from rhythmid.record.orientation import ANGLES
 from rhythmid.record.other_lengths import length_notes, unequal_arrays
 from rhythmid.record.placeholder import placeholder_of
 from rhythmid.record.sign_bit import sign_bit_of, signed
@@ -51,7 +52,7 @@ VEHICLES = ("nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage")  # computed poses
 FIXED = "/tf_static"  # constant frames
 FIRST = 200  # number of messages whose entries are listed: several nodes may publish frames in turn
 SKIPPED_FIELDS = re.compile(r"header|stamp|.*covariance|orientation|layout|points|time_from_start")
-NO_NUMBERS = "Quaternion"  # an orientation in four numbers, none of which is an angle by itself
+QUATERNION = "Quaternion"  # an orientation in four numbers, none of which is an angle by itself
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,8 @@ class Recorded:
 @dataclass(frozen=True)
 class Inventory:
     """All changing numbers of a source; how its times are given, and why; what was left out, including constants;
-    messages for the user; and for a bag all numbers in the order of their messages."""
+    messages for the user; and for a bag all numbers in the order of their messages, and the angles of its orientations, which are
+    used only where the user says so."""
 
     path: Path
     recorded: tuple[Recorded, ...]
@@ -112,6 +114,7 @@ class Inventory:
     constant: tuple[Recorded, ...] = ()
     notes: tuple[str, ...] = ()
     listed: tuple[Recorded, ...] = ()
+    angles: tuple[Recorded, ...] = ()
 
     @property
     def is_bag(self) -> bool:
@@ -250,6 +253,9 @@ def _of_bag(bag: Bag, vehicle: bool) -> Inventory:
     )
     begin = min((int(one.log_ns.min()) for one in columns.values() if len(one.log_ns)), default=0)
     found = [one for name, fields in wanted.items() for one in _filled(fields, columns[name], begin)]
+    angles = tuple(replace(one, unit="rad", written_unit="rad") for one in found if _is_angle(one, bag))
+    found = [one for one in found if all(str(one) != str(each) for each in angles)]
+    left += [_said_of_angles(one) for one in angles[:: len(ANGLES)]]
     moving = [one for one in found if len(one.value) > 1 and np.ptp(one.value) > 0.0]
     constant = [one for one in found if one not in moving]
     left += [f"{one}: never changes" for one in constant]
@@ -260,7 +266,21 @@ def _of_bag(bag: Bag, vehicle: bool) -> Inventory:
             f"{bag.path}: no topic holds a number that changes; topics: {', '.join(sorted(bag.topics)) or 'none'}"
         )
     still = tuple(one for one in constant if len(one.value) > 1)
-    return Inventory(bag.path, tuple(moving), Clock("receive"), "", tuple(left), still, listed=tuple(found))
+    return Inventory(
+        bag.path, tuple(moving), Clock("receive"), "", tuple(left), still, listed=tuple(found), angles=angles
+    )
+
+
+def _is_angle(one: Recorded, bag: Bag) -> bool:
+    """Whether a message's number is an angle of an orientation."""
+    return len(Field.parse(one.field).components(one.type, type_fields(bag.topics[one.topic]))) > 1
+
+
+def _said_of_angles(one: Recorded) -> str:
+    """What to do where an angle of an orientation is the motion."""
+    whole = one.field.rpartition(".")[0]
+    angles = ", ".join(f"{whole}.{angle}" for angle in ANGLES)
+    return f"{one.topic} {whole}: an orientation, whose angles in rad are {angles}; where one is the motion, say  --role output='{one}'"
 
 
 def _filled(fields: list[Recorded], columns: Columns, begin: int) -> Iterator[Recorded]:
@@ -290,14 +310,16 @@ def _numbers(
         return
     above = (*above, message)
     for name in getattr(message, "__dataclass_fields__", {}):
+        value = getattr(message, name)
+        here, words = f"{path}.{name}" if path else name, f"{said} {name}".strip()
+        if type(value).__name__.endswith(QUATERNION):
+            yield from ((f"{here}.{angle}", f"{words} {angle}", joint) for angle in ANGLES)
+            continue
         # constants of a type are capitalised, fields are not: docs.ros.org, ROS 2 interface definitions
         if name.startswith("__") or name.isupper() or SKIPPED_FIELDS.fullmatch(name):
             continue
-        value = getattr(message, name)
-        here, words = f"{path}.{name}" if path else name, f"{said} {name}".strip()
         if hasattr(value, "__dataclass_fields__"):
-            if not type(value).__name__.endswith(NO_NUMBERS):
-                yield from _numbers(value, here, words, joint, above)
+            yield from _numbers(value, here, words, joint, above)
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
             yield here, words, joint
         elif isinstance(value, (list, tuple, np.ndarray)) and 0 < len(value) <= WIDEST:

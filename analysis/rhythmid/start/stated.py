@@ -44,6 +44,8 @@ class Stated:
             found = _with(found, _in_unit(_channel(found, channel, "--unit"), unit))
         for role, channel in self.roles.items():
             one = _channel(found, channel, f"--role {role}=")
+            if any(one is each for each in found.angles):
+                found = replace(found, recorded=(*found.recorded, one))
             if all(one is not each for each in found.recorded):
                 raise InputError(f"{found.path}: {one} never changes, so that it cannot be the {role}")
             if role in ("input", "forcing") and BY_UNIT.get(one.unit, "effort") != "effort":
@@ -63,7 +65,7 @@ def _split(text: str, form: str, first: bool) -> tuple[str, str]:
 
 
 def _channel(found: Inventory, name: str, option: str) -> Recorded:
-    every = (*found.recorded, *found.constant)
+    every = (*found.recorded, *found.constant, *found.angles)
     for spelled in (str, lambda one: one.column, lambda one: one.said):
         matches = [one for one in every if spelled(one) == name]
         if len(matches) == 1:
