@@ -278,3 +278,9 @@ def test_a_compound_says_who_asked_for_an_effort_and_which_one_was_measured(tmp_
     path = table(tmp_path, Sollmoment=FORCE, Istmoment=FORCE + 0.1 * OTHER, Gelenkwinkel=X)
     assert roles_of(path) == {"output": "Gelenkwinkel", "input": "Sollmoment", "effort": "Istmoment"}
     assert "hold: zero" in guess(table(tmp_path, Sollmoment=FORCE, Gelenkwinkel=X)).signals
+
+
+def test_a_letter_of_what_a_controller_gives_out_is_an_axis_and_no_position(tmp_path):
+    """Two tables of `rostopic echo -p`: points of which one is a place and the other what two motors were asked for."""
+    path = table(tmp_path, **{"pose.field.point.z": X, "controls.field.point.x": FORCE})
+    assert roles_of(path) == {"output": "pose.field.point.z", "input": "controls.field.point.x"}

@@ -147,7 +147,10 @@ class _Reader:
             sent_ns if sent_ns is not None and _says_when_sent(sent_ns, log_ns) else None,
             stamp_ns,
             {one: _value(one, rows[place]) for one, place in zip(self.fields, places, strict=True)},
-            {one: np.logical_or.reduce(missing[place]) for one, place in zip(self.fields, places, strict=True)},
+            {
+                one: np.logical_or.reduce(missing[place])
+                for one, place in zip(self.fields, places, strict=True)
+            },
             {
                 one: self.reason[parts[0]]
                 for one, parts in zip(self.fields, self.parts, strict=True)

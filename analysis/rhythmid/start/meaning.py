@@ -291,7 +291,8 @@ def _plain_quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Qua
     for word in (*reversed(near), *reversed(far)):
         if word in DEVICES:
             return DEVICES[word], f"its name says {word!r}", True
-    for word in reversed(near):
+    # of what a controller gives out, a letter is an axis or a channel
+    for word in () if set(near) & CONTROLLED else reversed(near):
         if word in LETTERS:
             return LETTERS[word], f"{word!r} usually stands for that", False
     return None, "", False

@@ -51,7 +51,7 @@ COMMANDED = frozenset(
 )
 COMMANDED_LETTERS = frozenset("u r".split())
 # a controller's output, for an effort; the short words for a force also denote a contact's or a centre's
-CONTROLLED = frozenset("controller control ctrl contr ctl".split())
+CONTROLLED = frozenset("controller controllers control controls ctrl contr ctl".split())
 CONTROLLED_SHORT = frozenset("con ctr".split())
 # commanded by a policy; in a topic it denotes a ROS action
 COMMANDED_COLUMNS = frozenset(["action", "actions"])
