@@ -7,6 +7,7 @@ from legged import fixed_leg, recorded, references
 
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.record.joint_record import JointRecord
 
 MIDDLES = {"hip": (0.4, 0.3), "knee": (-1.2, 0.3)}
@@ -27,6 +28,16 @@ def coupled(record: JointRecord) -> JointRecord:
     return replace(
         record, joints={"hip": hip, "knee": replace(knee, effort=replace(knee.effort, value=effort))}
     )
+
+
+def test_the_answer_of_a_joint_names_the_records_that_were_held_out(tmp_path):
+    machine, rng, time = Machine.load(fixed_leg(tmp_path)), np.random.default_rng(2), TIME[:2000]
+    seen, unseen = (
+        recorded(machine, references(MIDDLES, time, rng, (0.4, 4.0)), time, rng) for _ in range(2)
+    )
+    laws = Catalogue({name: one for name, one in load_catalogue().items() if name == "viscous_damper"})
+    found = diagnose_machine([seen], machine, [replace(unseen, name="later")], catalogue=laws).diagnosis
+    assert {one.heldout for one in found.joints.values()} == {"held out: later"}
 
 
 def test_a_friction_that_turns_with_two_joints_is_unknown_physics_that_depends_on_the_other_one(tmp_path):

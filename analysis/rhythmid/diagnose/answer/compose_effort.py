@@ -34,7 +34,7 @@ from rhythmid.record.separate_zeros import separate_zeros_notes
 NO_SENSOR = "The measurement is assumed to be the motion: effects in the sensor and in the measurement's time are not among the candidates."
 SAME_HERE = "it acts on the recorded command, beside which nothing drives, as the actuator's law does"
 FIXED_SCALE = "The recorded effort is taken to be true in scale."
-# each varies its quantity over the whole range and leaves the others as they are, so that they cannot stand for it
+# the motion to record next, by the quantity on which the rest depends: it varies over its whole range, and the others stay, so that none stands for it
 MOTIONS = {
     "velocity": "constant speeds from the slowest to the fastest, in both directions, over the same travel and with the same load",
     "position": "one slow constant speed over the whole travel, there and back, with the same load",
@@ -67,9 +67,11 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     unknown = decision.verdict == "unknown_physics"
     depends = f"; it depends on {remainder.goes_with}" if unknown and remainder.goes_with is not None else ""
     slot, evidence = "force" if unknown else None, (result.applicability.reason,)
-    # held-out records without an effort cannot judge a hypothesis
-    unseen = result.heldout is not None
-    held = held_out_words(case.holdout, "") if unseen else "held out: every block of the records in its turn"
+    held = "held out: every block of the records in its turn"
+    if result.heldout is not None:  # held-out records without an effort cannot judge a hypothesis
+        # of the joint of a body only the balance is given
+        names = dict.fromkeys(motion.name for motion in result.heldout.motions)
+        held = held_out_words(case.holdout, ", ".join(names))
     return Diagnosis(
         verdict=decision.verdict,
         summary=summary_of(decision, missing, before, after, "effort", freed, noise_known=False),
