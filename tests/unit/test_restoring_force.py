@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE
-from rhythmid.diagnose.search.restoring_force import is_restored, restoring_force
+from rhythmid.diagnose.search.proposals import is_restored, restoring_force
 from rhythmid.elements.candidates import DYING, NEVER_REVERSED, ONE_WAY, candidates
 from rhythmid.identify.descent import WHITE
 from rhythmid.identify.output_error import start_only

@@ -18,7 +18,7 @@ from rhythmid.diagnose.baseline import Calibration
 from rhythmid.diagnose.calibration_evidence import Seen
 from rhythmid.diagnose.constants import FOLLOWS
 from rhythmid.diagnose.free_functions import FreeFunction
-from rhythmid.diagnose.search.restoring_force import is_restored
+from rhythmid.diagnose.search.proposals import is_restored
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit, estimate, rerun

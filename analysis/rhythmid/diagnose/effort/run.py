@@ -52,7 +52,7 @@ from rhythmid.identify.robust_covariance import root_weights, weighted, with_rob
 
 Array = NDArray[np.float64]
 K = TypeVar("K")
-PAST = 8  # past errors that predict the next one: two periods of the filter's cut-off, at 2.5 rows a period and more
+PAST = 8  # past errors that predict a lasting one: two periods of the filter's cut-off, at 2.5 rows a period and more
 LEAST_ROWS = 4 * PAST  # minimum rows of a record
 
 

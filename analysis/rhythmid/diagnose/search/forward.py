@@ -26,6 +26,7 @@ from rhythmid.diagnose.search.proposals import (
     pair_proposals,
     proposals,
     refitted,
+    restoring_force,
 )
 from rhythmid.diagnose.search.refit import (
     fine_enough,
@@ -35,7 +36,6 @@ from rhythmid.diagnose.search.refit import (
     under_noise,
     whole_fit,
 )
-from rhythmid.diagnose.search.restoring_force import restoring_force
 from rhythmid.diagnose.search.round import Round, could_pay, distinct, not_tried, one_round
 from rhythmid.diagnose.search.score_tests import under
 from rhythmid.diagnose.search.trial import Origin, Trial, contenders

@@ -15,6 +15,7 @@ from rhythmid.diagnose.search.trial import Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit, minimise, normalised_error
+from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series, record_of
 from rhythmid.model import Model, Term
 
@@ -27,6 +28,11 @@ PAIRS = 3  # number of pairs that are refitted because of their scores
 # of elements with such close statistics any may be the missing one
 WORTH = 10.0
 LEAST_LEVEL = 1e-6  # smallest level of a residual relative to the largest, against division by zero
+SPRING = "linear_spring"
+SHIFT = 1e-2  # share of the motion by which the position is shifted
+# share of that shift's change of speed on a spring that holds the mass in the dominant motion, below which nothing restores it
+HELD = 1e-3
+STIFFNESSES = (1.0, 0.2, 0.05)  # first guesses, as shares of the inertia's own stiffness m ω²
 MANY = 5  # guesses of one element from which more of them are tried, because its shape matters
 
 
@@ -144,6 +150,38 @@ def from_given(
         return []
     scores = score(fit, changes)
     return proposals(model, Round(tuple(scores), p_value(scores)), REFITTED, chi2)[0]
+
+
+def restoring_force(fit: Fit, catalogue: Catalogue, added: tuple[str, ...]) -> Iterator[Proposal]:
+    """The fitted model with a linear spring, if the catalogue holds one, nothing restores the position, and the motion comes back.
+
+    No score test shows it there. A score is linear in the missing effect, along the motion of the model without it. A force that depends on
+    the position decides whether that position wanders at all: along a run that wanders, even the sign of the score is arbitrary.
+    `added` are the labels of the effects that the model has beyond the nominal one.
+    """
+    if SPRING not in catalogue or not fit.run.series:
+        return
+    sizes = scales(fit.run.series, fit.model)
+    if not sizes.comes_back or is_restored(fit):
+        return
+    guesses = [{"stiffness": share * sizes.stiffness, "rest_length": sizes.centre} for share in STIFFNESSES]
+    yield propose(fit.model, catalogue[SPRING], guesses, added, fit.chi2)
+
+
+def is_restored(fit: Fit) -> bool:
+    """Whether a shift of the position changes the speed of the fitted model along any of its series."""
+    sizes = scales(fit.run.series, fit.model)
+    shift = SHIFT * sizes.position
+    usual = shift * (sizes.stiffness / sizes.mass) ** 0.5
+    for index, start in enumerate(fit.starts):
+        moved = start.copy()
+        moved[0] += shift
+        before, after = (fit.run.rows(fit.model, index, one) for one in (start, moved))
+        if before is None or after is None:
+            return True  # it is unstable: the score tests decide
+        if float(np.abs(after[:, 1] - before[:, 1]).max()) > HELD * usual:
+            return True
+    return False
 
 
 def follows_all(fit: Fit) -> bool:
