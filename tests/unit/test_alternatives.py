@@ -12,8 +12,9 @@ from rhythmid.diagnose.alternatives import LONGEST_DELAY, alternatives, fixed_va
 from rhythmid.diagnose.baseline import INPUT_DELAY
 from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.diagnose.search.round import Round
-from rhythmid.diagnose.search.score_tests import Score, changes_of, guesses, score, sizes_along, trajectories
+from rhythmid.diagnose.search.score_tests import Score, changes_of, score, sizes_along, trajectories
 from rhythmid.diagnose.search.trial import Proposal, Trial
+from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
@@ -35,7 +36,7 @@ def rounds_of(fit: Fit) -> list[Round]:
     """A round of scores of the lags at a fit."""
     lags = Catalogue({name: CATALOGUE[name] for name in LAGS})
     known = trajectories(fit)
-    scores = score(fit, changes_of(known, guesses(lags, fit.model, sizes_along(known))))
+    scores = score(fit, changes_of(known, candidates(lags, fit.model.setting, sizes_along(known)).tried))
     return [Round(tuple(scores), 0.0)]
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.search.score_tests import changes_of, guesses, score, trajectories
+from rhythmid.diagnose.search.score_tests import changes_of, score, trajectories
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
@@ -104,7 +104,7 @@ def test_a_travel_stop_throws_the_mass_back_in_the_frame_of_the_base(side):
 )
 def test_they_are_candidates_only_where_the_input_displaces_the_base(kind, there):
     model, given = mass("linear_spring", {"stiffness": 800.0, "rest_length": 0.0}), series(kind)
-    names = {element.name for element, _ in guesses(CATALOGUE, model, scales(given, model))}
+    names = {element.name for element, _ in candidates(CATALOGUE, model.setting, scales(given, model)).tried}
     assert (names >= ONLY_THERE) is there and bool(names & ONLY_THERE) is there
 
 

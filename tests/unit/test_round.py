@@ -9,11 +9,11 @@ from rhythmid.diagnose.search.round import one_round
 from rhythmid.diagnose.search.score_tests import (
     best_changes,
     changes_of,
-    guesses,
     score,
     sizes_along,
     trajectories,
 )
+from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare
@@ -53,13 +53,17 @@ def test_scores_are_those_of_changes_at_the_fit_that_the_noise_of_the_round_has_
     catalogue = Catalogue({name: library[name] for name in ("pendulum_gravity", "cubic_stiffness")})
     found, moved = one_round(fit, (), catalogue, None)
     known = trajectories(moved)
-    again = score(moved, changes_of(known, guesses(catalogue, moved.model, sizes_along(known))))
+    again = score(
+        moved, changes_of(known, candidates(catalogue, moved.model.setting, sizes_along(known)).tried)
+    )
     # most of a pendulum's gravity is what a spring does: only at the same fit is that told from the rest
     assert moved.values != pytest.approx(fit.values, rel=1e-3)
     assert [one.statistic for one in found.scores] == pytest.approx(
         [one.statistic for one in again], rel=1e-6
     )
-    best = best_changes(moved, changes_of(known, guesses(catalogue, moved.model, sizes_along(known))), 2)
+    best = best_changes(
+        moved, changes_of(known, candidates(catalogue, moved.model.setting, sizes_along(known)).tried), 2
+    )
     assert [(one.element, one.values) for one in best] == [(one.element, one.values) for one in again[:2]]
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.search.score_tests import changes_of, guesses, score, sizes_along, trajectories
+from rhythmid.diagnose.search.score_tests import changes_of, score, sizes_along, trajectories
+from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare
@@ -43,7 +44,7 @@ def test_a_mode_of_two_per_cent_of_the_mass_and_one_per_cent_damping_scores_best
     fit = estimate(nominal, prepare([Record(kind, Channel(TIME, y, "m"), Channel(TIME, u, "N"))]))
     known = trajectories(fit)
     sizes = sizes_along(known)
-    scores = score(fit, changes_of(known, guesses(CATALOGUE, fit.model, sizes)))
+    scores = score(fit, changes_of(known, candidates(CATALOGUE, fit.model.setting, sizes).tried))
     others = [one for one in scores if one.element.name != "second_mode"]
     assert scores[0].element.name == "second_mode"
     assert scores[0].statistic > 1.3 * others[0].statistic
