@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rhythmid.errors import InputError
 from rhythmid.excitation.sequence import build
 from rhythmid.identify.identify import identify
 from rhythmid.model import Model
@@ -114,3 +115,12 @@ def test_rows_that_repeat_all_channels_say_nothing_of_the_hold():
     assert interval(SMOOTH(copies), np.sin(2.0 * copies)) == 0.0
     held = TIME[np.arange(len(TIME)) // 16 * 16]
     assert interval(SMOOTH(held), np.sin(2.0 * copies)) == pytest.approx(0.08)
+
+
+def test_a_value_beyond_all_bounds_is_refused_in_one_line(tmp_path):
+    text = table(tmp_path, RATE).read_text().splitlines()
+    row = text[1000].split(",")
+    text[1000] = ",".join([row[0], "1e308", row[2]])
+    (tmp_path / "run.csv").write_text("\n".join(text) + "\n")
+    with pytest.raises(InputError, match="1 of 4000 samples are infinite"):
+        read_record(tmp_path / "run.csv", tmp_path / "signals.yaml")

@@ -35,7 +35,7 @@ def held_note(given: Channel, answer: Channel) -> str | None:
     not."""
     (time, first), (of_answer, _) = (np.unique(one.time, return_index=True) for one in (given, answer))
     value = given.value[first]
-    if len(time) < 2 or len(of_answer) < 2 or np.ptp(value) == 0.0:
+    if len(time) < 2 or len(of_answer) < 2 or not np.isfinite(value).all() or np.ptp(value) == 0.0:
         return None
     if interval := update_interval(given, answer):
         return (
@@ -57,7 +57,7 @@ def update_interval(given: Channel, answer: Channel) -> float:
     Samples at which the response also has its previous value are copies of a message, and do not count.
     """
     time, value = given.time, given.value
-    moved = np.concatenate([[True], np.diff(answer.value) != 0.0])
+    moved = np.concatenate([[True], answer.value[1:] != answer.value[:-1]])
     if np.array_equal(time, answer.time):
         time, value = time[moved], value[moved]
     change = np.abs(np.diff(value))
