@@ -56,10 +56,9 @@ def update_interval(given: Channel, answer: Channel) -> float:
 
     Samples at which the response also has its previous value are copies of a message, and do not count.
     """
-    time, value = given.time, given.value
-    moved = np.concatenate([[True], answer.value[1:] != answer.value[:-1]])
-    if np.array_equal(time, answer.time):
-        time, value = time[moved], value[moved]
+    copied = answer.time[1:][answer.value[1:] == answer.value[:-1]]
+    kept = ~np.isin(given.time, copied)
+    time, value = given.time[kept], given.value[kept]
     change = np.abs(np.diff(value))
     at = np.flatnonzero(change[:-1])
     step = change[at] > ROUNDING * shown_resolution(value)
