@@ -33,6 +33,7 @@ from rhythmid.record.timing import Timing
 from rhythmid.record.two_clocks import read_clock_notes
 from rhythmid.record.unsigned import unsigned_notes
 
+PACED = 10  # messages, below which a topic holds events, and has no rate to report
 MEGABYTE = 1e6  # bytes; smaller sizes are given in kB
 
 
@@ -164,9 +165,10 @@ class BagReport:
                 f", received {1e3 * topic.lateness_mean:.3f} ms after the stamp (at most {1e3 * topic.lateness_max:.3f})"
                 if topic.lateness_max is not None else ""
             )  # fmt: skip
+            pace = f"{timing.told_rate}, jitter {1e6 * timing.jitter_std:.3g} us, {timing.gaps} gaps, "
             found.append(
-                f"  {topic.name:{width}}  {topic.type}  {timing.count} messages, {timing.told_rate}, "
-                f"jitter {1e6 * timing.jitter_std:.3g} us, {timing.gaps} gaps, {timing.duplicates} duplicates{late}"
+                f"  {topic.name:{width}}  {topic.type}  {timing.count} messages, "
+                f"{pace if timing.count >= PACED else ''}{timing.duplicates} duplicates{late}"
             )
         for role, channel in self.channels.items():
             facts = ", ".join(channel.facts())
