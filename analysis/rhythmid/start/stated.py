@@ -47,7 +47,8 @@ class Stated:
             if any(one is each for each in found.angles):
                 found = replace(found, recorded=(*found.recorded, one))
             if all(one is not each for each in found.recorded):
-                raise InputError(f"{found.path}: {one} never changes, so that it cannot be the {role}")
+                step = "; a set point to which the output goes is found without it" if role in DRIVES else ""
+                raise InputError(f"{found.path}: {one} never changes, so that it cannot be the {role}{step}")
             if role in ("input", "forcing") and BY_UNIT.get(one.unit, "effort") != "effort":
                 raise InputError(
                     f"{found.path}: {one} is in {one.unit}, which is no force; say  reference={channel}  where a controller follows it, or  "
