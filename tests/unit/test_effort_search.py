@@ -67,6 +67,18 @@ def test_a_hysteresis_that_hardly_yields_within_the_travel_is_not_named_in_the_p
     assert spring.chosen.elements == ("linear_spring",)
 
 
+def test_a_gap_is_named_beside_the_spring_whose_gap_it_is_where_the_nominal_model_has_neither():
+    record = axis(friction=0.0, length=12.0)
+    position = np.interp(record.input.time, record.output.time, record.output.value)
+    effort = record.input.value + 60.0 * (position - np.clip(position, -0.1, 0.1))
+    record = replace(record, input=replace(record.input, value=effort))
+    only = CATALOGUE.without(*(name for name in CATALOGUE if name not in ("linear_spring", "freeplay")))
+    found = search_effort([record], axis_model(), only, most=2)
+    assert found.chosen.elements == ("linear_spring", "freeplay")
+    assert found.chosen.model.value("linear_spring.stiffness") == pytest.approx(60.0, rel=0.02)
+    assert found.chosen.model.value("freeplay.gap") == pytest.approx(0.2, rel=0.02)
+
+
 def test_a_weight_beside_friction_is_no_friction_that_acts_in_one_direction_only():
     record = axis(friction=0.3)
     assert record.input is not None

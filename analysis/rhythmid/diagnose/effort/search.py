@@ -236,17 +236,20 @@ class _Search:
         """Base models for an addition.
 
         The parent, or where it holds related laws: the parent without them, and the parent that keeps those of them that do not
-        contain the addition. A machine may have both a constant friction and one that grows with the load.
+        contain the addition. A machine may have both a constant friction and one that grows with the load. A law that the addition
+        needs stays, as the spring whose gap it is.
         """
-        if start.element is None:
+        law = start.element
+        if law is None:
             return [] if start.name in parent.elements else [parent]
         model = parent.fit.model
         terms = {label: term for label in parent.elements if (term := model.term(label)) is not None}
-        related = [label for label, term in terms.items() if kin(term.element, start.element)]
+        near = [label for label, term in terms.items() if kin(term.element, law)]
+        related = [label for label in near if model.pruned(label).lacking(law) is None]
         base = beside = parent
         for label in related:
             base = self.without(base, label)
-            if contained(terms[label].element, start.element):
+            if contained(terms[label].element, law):
                 beside = self.without(beside, label)
         return [base] if beside.elements == base.elements else [base, beside]
 
