@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from untidy_logs import FAULTS, MACHINES, simulated, written
 
+from rhythmid.diagnose.admission import admitted
 from rhythmid.diagnose.baseline import calibrate
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.identify import identify
 from rhythmid.identify.multiple_shooting import periods_long, windows
+from rhythmid.identify.plausibility import likely_mend
 from rhythmid.identify.series import hold_out_tail, prepare
 from rhythmid.model import Model
 from rhythmid.record.read import read_record
@@ -36,3 +38,11 @@ def test_identify_follows_a_pendulum_that_turns_over(tmp_path):
     signals, model = files(tmp_path, "few_lost", 501)
     found = identify([read_record(signals)], Model.load(model))
     assert found.usable and found.parameters["pendulum_gravity.moment"].value == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_stretch_between_gaps_in_which_a_pendulum_turns_over_is_not_taken_for_one_of_the_other_sign(
+    tmp_path,
+):
+    signals, nominal = files(tmp_path, "gaps", 514)
+    model = Model.load(nominal)
+    assert likely_mend(model, admitted([read_record(signals)], (), model).records) is None

@@ -31,6 +31,7 @@ from rhythmid.identify.joint import prepared_model
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.search_quality import POOR_MOTION, Search, explained
 from rhythmid.identify.series import Series, dominant_frequency, prepare
+from rhythmid.identify.short_windows import from_short_windows
 from rhythmid.model import INERTIA, Model
 from rhythmid.record.record import Record
 from rhythmid.report.quantity import number
@@ -140,7 +141,7 @@ def _searched_again(
 ) -> Trial | None:
     """Second fit of the record as declared, before a change is accepted. It starts from the values found with the
     change, with and without its factor in the values to which a force is proportional, and also uses a shorter
-    stretch."""
+    stretch, and the values and initial states of short windows."""
     if best.fit is None:
         return None
     found = {n: best.fit.model.value(n) for n in model.free}
@@ -154,6 +155,9 @@ def _searched_again(
         again = _tried(AS_DECLARED, record, model.with_values(within), pool, model, periods)
         if again is not None and again.unexplained < POOR_MOTION:
             return again
+    again = _tried(AS_DECLARED, record, model, pool, in_windows=True)
+    if again is not None and again.unexplained < POOR_MOTION:
+        return again
     richer = _with_more(record, model, pool)
     return richer if richer is not None and richer.unexplained < POOR_MOTION else None
 
@@ -307,6 +311,7 @@ def _tried(
     pool: ThreadPoolExecutor | None,
     given: Model | None = None,
     periods: float = STRETCH,
+    in_windows: bool = False,
 ) -> Trial | None:
     """The model refitted to a stretch of the record under a change; None where it cannot be simulated."""
     changed = change.applied(record)
@@ -316,7 +321,10 @@ def _tried(
         ready, pumping = prepared_model(model, [changed])
         one = _stretch(prepare([changed])[0], periods)
         noise = replace(WHITE, std=1e-2 * max(float(np.std(one.averaged)), 1e-300))
-        fit = estimate(ready, [one], noise=noise, pool=pool, iterations=ITERATIONS)
+        if in_windows:
+            fit = from_short_windows(ready, [one], pool)
+        else:
+            fit = estimate(ready, [one], noise=noise, pool=pool, iterations=ITERATIONS)
         return Trial(change, unexplained(explained(fit, pumping)), shift(given or model, fit.model), fit)
     except InputError:
         return None
