@@ -28,10 +28,10 @@ from rhythmid.identify.descent import WHITE
 from rhythmid.identify.free_run import with_series
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.joint import prepared_model
+from rhythmid.identify.other_starts import from_windows
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.search_quality import POOR_MOTION, Search, explained
 from rhythmid.identify.series import Series, dominant_frequency, prepare
-from rhythmid.identify.short_windows import from_short_windows
 from rhythmid.model import INERTIA, Model
 from rhythmid.record.record import Record
 from rhythmid.report.quantity import number
@@ -322,7 +322,7 @@ def _tried(
         one = _stretch(prepare([changed])[0], periods)
         noise = replace(WHITE, std=1e-2 * max(float(np.std(one.averaged)), 1e-300))
         if in_windows:
-            fit = from_short_windows(ready, [one], pool)
+            fit = from_windows(ready, [one], pool)
         else:
             fit = estimate(ready, [one], noise=noise, pool=pool, iterations=ITERATIONS)
         return Trial(change, unexplained(explained(fit, pumping)), shift(given or model, fit.model), fit)
