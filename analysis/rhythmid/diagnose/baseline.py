@@ -17,7 +17,7 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.early_output import EARLIEST
 from rhythmid.identify.harmonic_likelihood import DELAYS
-from rhythmid.identify.other_starts import from_delays, from_windows
+from rhythmid.identify.other_starts import SETTLED, from_delays, from_windows
 from rhythmid.identify.output_error import Fit, estimate, with_bounds
 from rhythmid.identify.record_scales import REST_LENGTH
 from rhythmid.identify.series import Series
@@ -31,9 +31,6 @@ from rhythmid.value import Prior
 
 NO_ORIGIN = "No position was measured, so that its origin is arbitrary: the spring's rest length is kept as it was given."
 EVEN = 1e-3  # of the period; spread of the sampling intervals up to which the samples count as even
-# error, as a share of the motion, up to which a fit is not restarted from short windows. At another minimum the model parts from
-# the motion somewhere, by a part of it; of a pendulum that turns over, a tenth of the whole is a turn
-SETTLED = 0.01
 # [s] delays from which another minimum is sought: from a few samples to a slow network
 FAR_DELAYS = (0.03, 0.08, 0.15, 0.25)
 

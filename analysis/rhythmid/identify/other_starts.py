@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 
 import numpy as np
 
@@ -12,14 +13,20 @@ from rhythmid.identify.series import Series
 from rhythmid.model import Model
 
 WINDOWS = 60  # short windows that are fitted, beside the first of each series
+# error, as a share of the motion, up to which the model follows a fit's series. At another minimum it parts from the motion
+# somewhere, by a part of it; of a pendulum that turns over, a tenth of the whole is a turn
+SETTLED = 0.01
 ITERATIONS = 12  # of a fit that only gives a start
 
 
-def from_windows(model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None = None) -> Fit:
+def from_windows(
+    model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None = None, deeper: bool = True
+) -> Fit:
     """The fit from the values and initial states of short windows with initial states of their own, in which wrong values cannot drift far.
 
     Values alone are not enough where a machine parts from a motion that begins a little elsewhere, as a pendulum does near its
-    upper rest: a run with the right values and a rough initial state ends in another turn.
+    upper rest: a run with the right values and a rough initial state ends in another turn. Where the model does not follow the windows
+    either, and `deeper`, their fit starts from shorter ones.
     Raises InputError where the model diverges.
     """
     length = float(np.median([periods_long(one) for one in series]))
@@ -28,7 +35,12 @@ def from_windows(model: Model, series: Sequence[Series], pool: ThreadPoolExecuto
         firsts.append(len(windows))
         windows += split(one, length)
     chosen = sorted({*firsts, *range(0, len(windows), max(1, len(windows) // WINDOWS))})
-    short = estimate(model, [windows[index] for index in chosen], iterations=ITERATIONS, pool=pool)
+    cut = [windows[index] for index in chosen]
+    short = estimate(model, cut, iterations=ITERATIONS, pool=pool)
+    if deeper and short.nrmse() > SETTLED and len(windows) > len(series):
+        with suppress(InputError):  # too short to simulate
+            again = from_windows(model, cut, pool, deeper=False)
+            short = again if again.sum_of_squares < short.sum_of_squares else short
     starts = [short.starts[chosen.index(first)] for first in firsts]
     return estimate(short.model, series, starts=starts, pool=pool)
 
