@@ -158,8 +158,8 @@ def load(number: int) -> Iterator[None]:
 
 
 @contextmanager
-def benched(limits: Limits, tell: bool) -> Iterator[Bench]:
-    """A bench in its own DDS domain, with these timeouts; with `tell` it prints the output of the nodes."""
+def benched(limits: Limits, priority: int, tell: bool) -> Iterator[Bench]:
+    """A bench in its own DDS domain, with these timeouts and this priority of the nodes; with `tell` it prints the output of the nodes."""
     with tempfile.TemporaryDirectory() as folder, own_domain() as domain:
         os.environ.pop("ROS_DOMAIN_ID", None)
         os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = (
@@ -169,7 +169,7 @@ def benched(limits: Limits, tell: bool) -> Iterator[Bench]:
         with suppress(OSError):
             Path("/proc/self/autogroup").write_text("-10", encoding="ascii")
         rclpy.init(args=[])
-        bench = Bench(Path(folder), limits.times, tell)
+        bench = Bench(Path(folder), limits.times, priority, tell)
         try:
             yield bench
         finally:
@@ -203,9 +203,10 @@ def main(
     fault: Annotated[list[str] | None, typer.Option(help="which faults; none: all")] = None,
     busy: Annotated[int, typer.Option("--load", help="busy processes beside")] = 0,
     healthy: Annotated[float, typer.Option(help="seconds without any fault, instead")] = 0.0,
+    priority: Annotated[int, typer.Option(help="of the nodes (SCHED_FIFO); 0: none")] = 0,
 ) -> None:
     kept = True
-    with load(busy), benched(limits, tell=bool(healthy)) as bench:
+    with load(busy), benched(limits, priority, tell=bool(healthy)) as bench:
         if healthy:
             raise typer.Exit(0 if stay_healthy(bench, healthy) else 1)
         print(f"{'fault':20} {'n':>4} {f'in {PROMISED:g} s':>9} {'median':>8} {'worst':>8}")

@@ -143,8 +143,9 @@ class Robot:
 class Bench:
     """The two nodes under test, restarted if a fault has ended one."""
 
-    def __init__(self, folder: Path, limits: Times, tell: bool) -> None:
+    def __init__(self, folder: Path, limits: Times, priority: int, tell: bool) -> None:
         self.limits = limits
+        self._priority = priority
         self._tell = tell
         self.robot = Robot()
         self.stops = 0
@@ -193,7 +194,7 @@ class Bench:
         if name in self._running and not self.ended(name):
             return
         path = self._folder / f"{name}.yaml"
-        given = {**parameters, **self.limits.parameters(name)}
+        given = {**parameters, "priority": self._priority, **self.limits.parameters(name)}
         path.write_text(yaml.safe_dump({"/**": {"ros__parameters": given}}, width=2**16))
         line = [
             sys.executable,

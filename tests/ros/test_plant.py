@@ -2,6 +2,7 @@
 
 import errno
 import os
+import threading
 import time
 from pathlib import Path
 
@@ -43,6 +44,15 @@ def test_real_time_samples_lie_on_the_grid_without_gaps_and_follow_the_physics(g
     for field in ("position", "velocity", "effort"):
         heard = [getattr(message, field)[0] for message in states[:300]]
         np.testing.assert_allclose(heard, getattr(expected, field)[skipped:], rtol=1e-12, atol=1e-12)
+
+
+def test_with_a_priority_the_threads_that_receive_get_it_as_the_clock_does(graph, monkeypatch):
+    given = {}
+    monkeypatch.setattr(os, "sched_setscheduler", lambda thread, *asked: given.update({thread: asked}))
+    node = graph.add(PlantNode, model=str(MODEL), priority=20)
+    graph.until(lambda: int(node.figures()["samples"]) > 0, "samples")
+    assert given[threading.main_thread().native_id] == (os.SCHED_FIFO, os.sched_param(20))
+    assert len(given) > 1
 
 
 def test_without_the_right_to_priority_it_runs_at_ordinary_priority_and_says_so(graph, monkeypatch, capsys):

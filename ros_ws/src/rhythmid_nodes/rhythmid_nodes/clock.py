@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 from .lateness import Lateness
 
@@ -59,7 +60,7 @@ def _offset_ns() -> int:
 
 
 class Worker:
-    """A thread that ends on request, can be started again, and passes an exception on to the node."""
+    """A thread that ends on request, can be started again, and passes an exception on to the node. With a `priority` the whole process gets it."""
 
     def __init__(self, name: str, body: Callable[[], None], priority: int = 0) -> None:
         self.stopping = threading.Event()
@@ -84,7 +85,7 @@ class Worker:
     def _run(self) -> None:
         if self._priority:
             try:
-                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(self._priority))
+                _prioritise(self._priority)
             except OSError as refused:
                 print(
                     f"warning: no SCHED_FIFO priority {self._priority}: {refused.strerror}", file=sys.stderr
@@ -93,6 +94,13 @@ class Worker:
             self._body()
         except BaseException as failure:
             self.failure = failure
+
+
+def _prioritise(priority: int) -> None:
+    """SCHED_FIFO for all threads of this process: a clock thread in time is of no use while those wait that receive what it sends or judges."""
+    for thread in os.listdir("/proc/self/task"):
+        with suppress(ProcessLookupError):  # it has ended
+            os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(priority))
 
 
 class Grid(Worker):

@@ -51,7 +51,7 @@ COUNT = Parameter("count", 0, "samples of the whole run; 0: no end (realtime onl
 PRIORITY = Parameter(
     "priority",
     0,
-    "SCHED_FIFO priority of the clock thread; 0: none; needs the right to set it",
+    "SCHED_FIFO priority of the process; 0: none; needs the right to set it",
     bounds=(0, 99),
 )
 CATCH_UP = Parameter(
