@@ -66,6 +66,7 @@ def test_a_load_that_is_heavier_and_farther_out_is_told_with_its_mass_and_its_ce
     assert "the mass and centre of lower" in answer.diagnosis.summary
 
 
+@pytest.mark.long  # test_link_mass finds a mass, and the tests above and below one beside a gain and a load
 def test_a_mass_is_found_with_its_value_though_the_joint_above_has_a_friction(tmp_path: Path):
     nominal = two_links(tmp_path, body=", step: 0.0005")
     heavier = nominal.with_inertial({"lower.mass": 1.4}).with_element(

@@ -47,6 +47,7 @@ def test_a_run_is_the_record_that_is_loaded_from_its_bag(run, bag: Path):
             np.testing.assert_allclose(loaded.every[joint].channels[role].value, channel.value)
 
 
+@pytest.mark.long  # test_cli_legs diagnoses the same leg by the command
 def test_a_model_with_a_body_is_diagnosed_by_the_function_for_one_axis(bag: Path):
     leg = rh.Model.load(MODELS / "leg.yaml")
     assert isinstance(leg, Machine)

@@ -9,6 +9,7 @@ import numpy as np
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import periods_long, split
 from rhythmid.identify.output_error import Fit, estimate, minimise
+from rhythmid.identify.search_quality import POOR_MOTION
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 
@@ -27,7 +28,7 @@ def from_windows(
     Values alone are not enough where a machine parts from a motion that begins a little elsewhere, as a pendulum does near its
     upper rest: a run with the right values and a rough initial state ends in another turn. Where the model does not follow the windows
     either, and `deeper`, their fit starts from shorter ones.
-    Raises InputError where the model diverges.
+    Raises InputError where the model diverges, or does not follow short windows.
     """
     length = float(np.median([periods_long(one) for one in series]))
     windows, firsts = list[Series](), list[int]()
@@ -41,6 +42,10 @@ def from_windows(
         with suppress(InputError):  # too short to simulate
             again = from_windows(model, cut, pool, deeper=False)
             short = again if again.sum_of_squares < short.sum_of_squares else short
+    if short.nrmse() > POOR_MOTION:
+        raise InputError(
+            "the model does not follow the motion in short windows either, which therefore give no start"
+        )
     starts = [short.starts[chosen.index(first)] for first in firsts]
     return estimate(short.model, series, starts=starts, pool=pool)
 
