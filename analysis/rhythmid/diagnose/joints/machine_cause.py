@@ -5,6 +5,7 @@ the search costs, and the odds of each of its numbers; and what it explains at s
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -78,16 +79,16 @@ class Cause(Numbers, Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class LinearCause:
+class LinearCause(ABC):
     """A cause with whose coordinates (p,) the efforts of the `balances` change linearly, by these `weights` (n, p)."""
 
     balances: JointBalances
     records: Sequence[JointRecord]
     weights: Columns
 
+    @abstractmethod
     def coordinates(self, numbers: Array) -> Array:
         """As for `Numbers`."""
-        raise NotImplementedError
 
     def imposed(self, numbers: Array, paths: Mapping[str, Model]) -> JointBalances:
         """The balances with these numbers; columns of links are left as they are."""
