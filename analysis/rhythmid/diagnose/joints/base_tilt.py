@@ -16,7 +16,8 @@ from rhythmid.body.robot_file import FREE
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.joints.joint_case import JointResult
-from rhythmid.diagnose.joints.machine_cause import Columns, LinearCause, WeightedRows, rows_of, worth_it
+from rhythmid.diagnose.joints.linear_cause import LinearCause
+from rhythmid.diagnose.joints.machine_cause import Columns, WeightedRows, rows_of, worth_it
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord

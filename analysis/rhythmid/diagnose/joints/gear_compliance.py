@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.constants import CONTRADICTS
 from rhythmid.diagnose.joints.joint_case import JointResult
-from rhythmid.diagnose.joints.machine_cause import Columns, most_promising, side_by_side, worth_it
+from rhythmid.diagnose.joints.linear_cause import side_by_side
+from rhythmid.diagnose.joints.machine_cause import Columns, most_promising, worth_it
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.joints.elastic_gear import ElasticGear
 from rhythmid.identify.joints.joint_motion import JointBalances

@@ -19,18 +19,17 @@ from rhythmid.body.machine import Machine
 from rhythmid.diagnose.constants import CONTRADICTS, EQUIVALENT
 from rhythmid.diagnose.joints.dry_friction import dry_in_place, laws_found
 from rhythmid.diagnose.joints.joint_case import OF_LINKS, JointResult
+from rhythmid.diagnose.joints.linear_cause import LinearCause, side_by_side
 from rhythmid.diagnose.joints.link_evidence import advantage
 from rhythmid.diagnose.joints.link_group import masses_alike
 from rhythmid.diagnose.joints.machine_cause import (
     Beside,
     Columns,
-    LinearCause,
     Options,
     Weighed,
     best_beside,
     matters,
     options_of,
-    side_by_side,
     weighed,
 )
 from rhythmid.diagnose.joints.wrong_link import WrongLink, values_of

@@ -17,9 +17,10 @@ from rhythmid.body.inertial_parameter import MASS, MOMENT, PAYLOAD, split
 from rhythmid.body.link_inertia import point_mass
 from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.diagnose.joints.linear_cause import side_by_side
 from rhythmid.diagnose.joints.link_cause import NUMBERS, LinkChange, columns_of, kinds_of
 from rhythmid.diagnose.joints.link_evidence import laws_of
-from rhythmid.diagnose.joints.machine_cause import SETTLED, refined, rows_of, side_by_side
+from rhythmid.diagnose.joints.machine_cause import SETTLED, refined, rows_of
 from rhythmid.diagnose.joints.wrong_link import WrongLink, values_of
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.identify.joints.joint_motion import JointBalances
